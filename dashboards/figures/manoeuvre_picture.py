@@ -34,7 +34,7 @@ def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     """
     swept = PathPatch(_path_of(swept_by(plan.states, vehicle)), facecolor=_SWEPT, linewidth=0, zorder=2)
     axes.add_patch(swept)
-    draw_way(axes, plan, vehicle)
+    draw_way(axes, plan, vehicle, 6.5)
     gears = gears_of(plan, vehicle)
     for row in [*cusps_of(plan, vehicle), *[len(gears)] * (len(gears) > 0)]:
         colour = FORWARDS if gears[row - 1] > 0 else BACKWARDS
@@ -43,16 +43,16 @@ def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
         axes.add_collection(drawn)
 
 
-def draw_way(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
+def draw_way(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, zorder: float = 4.0) -> None:
     """Draw the way of the reference point along ``plan`` in the colours of its gears, with arrows."""
     gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
     for first, last in pairwise([0, *cusps, len(gears)] if len(gears) else []):
         colour = FORWARDS if gears[first] > 0 else BACKWARDS
-        axes.plot(*plan.states[first : last + 1, :2].T, color=colour, linewidth=1.8, zorder=6.5)
+        axes.plot(*plan.states[first : last + 1, :2].T, color=colour, linewidth=1.8, zorder=zorder)
     draw_travel_arrows(axes, plan, vehicle, {1: FORWARDS, -1: BACKWARDS})
     axes.plot(
         *plan.states[cusps, :2].T, linestyle="none", marker="o", markersize=4, color="white",
-        markeredgecolor=INK, markeredgewidth=1.0, zorder=7,
+        markeredgecolor=INK, markeredgewidth=1.0, zorder=zorder + 0.5,
     )  # fmt: skip
 
 

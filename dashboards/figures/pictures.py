@@ -16,7 +16,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, draw_way, manoeuvre_legend, way_legend
 from dashboards.figures.marks import draw_scale_bar
 from dashboards.figures.style import legend_below, message_figure, new_figure
-from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
+from dashboards.palette import GREY, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
     CheckedPlan,
     asked_pose,
@@ -32,6 +32,7 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
+_ON_ITS_WAY: Final[dict[str, Any]] = {"facecolor": (SKY, 0.28), "edgecolor": GREY, "linewidth": 0.8}
 _MOVED: Final[dict[str, Any]] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (5, 2))}
 
 
@@ -93,7 +94,7 @@ def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     """Draw the way of the reference point along ``plan``, with arrows; the ``vehicle`` every few metres."""
     draw_way(axes, plan, vehicle)
     shown = shown_states(plan, vehicle)
-    _draw_bodies(axes, shown, vehicle, facecolor=(GREEN, 0.2), edgecolor=GREEN, linewidth=0.8, zorder=3)
+    _draw_bodies(axes, shown, vehicle, **_ON_ITS_WAY, zorder=3)
 
 
 def draw_recalled(axes: Axes, recalled: CheckedPlan, collisions: bool = False) -> None:
@@ -233,6 +234,8 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
         handles += manoeuvre_legend([*ways, *manoeuvres])
     elif ways:
         handles += way_legend(ways)
+    if ways:
+        handles.append(Patch(**_ON_ITS_WAY, label="the vehicle every few metres"))
     if any(example.moved is not None for example in examples):
         handles.append(Line2D([], [], **_MOVED, label="stored drive, before it was moved"))
     if not any(example.recalled for example in examples):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Polygon
 
 from dashboards.figures.map_picture import draw_map
 from dashboards.figures.map_view import (
@@ -26,7 +27,15 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.stuck import Stuck
 from planners.world.arrays import Floats, Point, Pose
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle, trailers_of
+
+_CROSS: Final[dict[str, Any]] = {
+    "marker": "X", "color": VERMILLION, "markeredgecolor": "white", "linestyle": "none"
+}  # fmt: skip
+_GAP: Final[dict[str, Any]] = {
+    "marker": "D", "color": "none", "markeredgecolor": VERMILLION, "markeredgewidth": 1.6, "linestyle": "none"
+}  # fmt: skip
+_BEYOND: Final = "#e6e6e6"  # the map: nobody may drive there
 
 
 def stuck_picture(
@@ -63,16 +72,25 @@ def stuck_picture(
     )
     handles = draw_ends(axes, world, start, stops, scale, view.longest)
     for close_up in close_ups:
-        axes.plot(x, y, marker="X", color=VERMILLION, markeredgecolor="white", markersize=11, zorder=12)
-        cross = Line2D([], [], marker="X", color=VERMILLION, linestyle="none", markersize=9)
-        cross.set_label("stuck here")
-        handles.append(cross)
+        axes.plot(x, y, **_CROSS, markersize=11, zorder=12)
+        handles.append(Line2D([], [], **_CROSS, markersize=9, label="stuck here"))
+        if stuck.gap is not None:
+            right, up = stuck.gap.place
+            right, up, _ = world.pose(scale * right, scale * up, 0.0)
+            for each in (axes, close_up):
+                each.plot(right, up, **_GAP, markersize=9, zorder=11)
+            handles.append(Line2D([], [], **_GAP, markersize=8, label="narrowest place of the widest way"))
         standing = _standing_at(stuck.place, start, stops, vehicle)
         reach = CLOSE_UP_LENGTHS * scale * footprint_spacing_m(vehicle if standing is None else standing[1])
         draw_map(close_up, world, OCCUPIED)
         close_up.set_xlim(x - reach, x + reach)
         close_up.set_ylim(y - reach, y + reach)
+        close_up.set_facecolor(_BEYOND)
+        edges = [world.pose(right, up, 0.0)[:2] for right, up in _corners(world)]
+        close_up.add_patch(Polygon(edges, facecolor="white", zorder=0.5))
         close_up.set_title("what is around the cross", fontsize=9, color=INK, loc="left", pad=4)
+        if standing is None:
+            close_up.plot(x, y, **_CROSS, markersize=11, zorder=12)
         if standing is not None:
             bodies, _ = outlines(*standing)
             shown = [placed(world, scale * body) for body in bodies]
@@ -87,10 +105,17 @@ def stuck_picture(
     return figure
 
 
+def _corners(world: OccupancyMap) -> list[Point]:
+    """The corners of a map in grid metres, one after another."""
+    width, height = world.size
+    return [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+
+
 def _standing_at(
     place: Point, start: Pose, stops: Sequence[Stop], vehicle: Vehicle
 ) -> tuple[Floats, Vehicle] | None:
     """Who stands at a place, as ``asked_pose``: at the start or in a goal pose; None if neither is there."""
-    arrivals = [AT_REST._replace(heading=start[2])] if place == start[:2] else []
+    straight = (0.0,) * len(trailers_of(vehicle))
+    arrivals = [AT_REST._replace(heading=start[2], hitches=straight)] if place == start[:2] else []
     arrivals += [stop.arrival for stop in stops if stop.place == place]
     return asked_pose(place, arrivals[0], vehicle) if arrivals else None

@@ -76,7 +76,7 @@ def plan(
         options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant
-    from tasks.requests.plan_answers import LEAST_BACKWARDS_M
+    from tasks.requests.plan_answers import gears_told
     from tasks.requests.plan_one import plan_one
     from tasks.settings.errors import RunError
 
@@ -88,15 +88,9 @@ def plan(
     lines = []
     if found is not None:
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
-        gears = answer["gear_changes"]
-        changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
-        if answer["backwards_m"] >= LEAST_BACKWARDS_M:
-            changes += f", {answer['backwards_m']:.1f} m backwards"
-        if answer["cost_s"] != found.duration_s:
-            changes += f", costs {answer['cost_s']:.1f} s"
         lateral = answer["lateral_acceleration"]
         sideways = f", up to {lateral:.1f} m/s² sideways" if lateral >= _LEAST_LATERAL else ""
-        lines.append(f"{attempt.source}, {times}{changes}{sideways}")
+        lines.append(f"{attempt.source}, {times}{gears_told(answer)}{sideways}")
     write_answer(*lines, **answer)
     write_files(plan=written, picture=picture)
     _write_learned(learn)

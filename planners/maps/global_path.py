@@ -14,36 +14,42 @@ from planners.maps.occupancy_map import OccupancyMap, blocks
 from planners.world.arrays import Floats, Integers
 from planners.world.problem import CANONICAL_DISTANCE
 
-NEARLY: Final = 0.9  # of the width of a disc, so that no oblique gap is lost between cells
 SHARE: Final = 0.36  # of the width of a disc: spots of neighbours on two sides of a wall are farther apart
-OFF_MIDDLE: Final = 0.25  # cells by which the clearance of a middle may fall short of that of a point beside
+OFF_MIDDLE: Final = math.sqrt(0.5) - 0.5  # cells: no disc has so much more room than one in a cell's middle
+MIN_CLEAR: Final = (
+    0.5  # cells, between occupied ones, of which the middle has 0, and free ones, with 1 or more
+)
 _STEPS: Final = ((0, 1), (1, 0), (1, 1), (1, -1))  # row, column; the other four go backwards
 
 
 class GlobalPaths:
     """Shortest paths between free cells. A diagonal step needs the cells on both sides free."""
 
-    def __init__(self, grid: OccupancyMap, spots: Floats | None = None) -> None:
+    def __init__(
+        self, grid: OccupancyMap, spots: Floats | None = None, rooms: Integers | None = None
+    ) -> None:
         """Find paths over the cells of a map.
 
         Args:
             grid: the map.
             spots: ``[rows, columns, 2]`` where paths lead through each cell (metres); None: its middle.
+            rooms: ``[rows, columns]`` numbers of parts of the map; no path leads from one to another.
         """
         if spots is None:
             rows, columns = np.indices(grid.occupied.shape)
             spots = grid.resolution * (np.stack((columns, rows), axis=-1) + 0.5)
         self.grid, self.spots = grid, spots
+        self.rooms = np.zeros(grid.occupied.shape, np.int32) if rooms is None else rooms
 
     @cached_property
     def _edges(self) -> sparse.csr_array:
         free = np.pad(~self.grid.occupied, 1)
-        cells = np.arange(free.size).reshape(free.shape)
+        cells, rooms = np.arange(free.size).reshape(free.shape), np.pad(self.rooms, 1)
         ends, lengths = [], []
         for row, column in _STEPS:
             to = np.roll(cells, (-row, -column), (0, 1))
             beside = np.roll(free, -row, 0) & np.roll(free, -column, 1)
-            good = free & free.reshape(-1)[to] & beside
+            good = free & free.reshape(-1)[to] & beside & (rooms == rooms.reshape(-1)[to])
             ends.append(np.stack([cells[good], to[good]]))
             lengths.append(np.full(int(good.sum()), math.hypot(row, column)))
         tails, heads = np.concatenate(ends, axis=1)
@@ -71,17 +77,20 @@ def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
         cell_m: width of a cell at most, metres, if those of the map are no wider.
     """
     clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]  # cells between middles
+    least = max(0.5 * width / world.resolution - OFF_MIDDLE, MIN_CLEAR)
+    parts, _ = ndimage.label(clear >= least, np.ones((3, 3)))  # a door that is too narrow joins none
     factor = max(1, math.floor(min(cell_m, SHARE * width) / world.resolution + 1e-9))
     squares = np.moveaxis(blocks(clear, factor, 0.0), 2, 1)  # [rows, columns, factor, factor]
     rows, columns = squares.shape[:2]
-    squares = squares.reshape(rows, columns, -1)
-    best = squares.argmax(axis=2)
-    roomy = np.take_along_axis(squares, best[..., np.newaxis], axis=2)[..., 0]
-    fits = (roomy > 0.0) & (roomy >= 0.5 * NEARLY * width / world.resolution - OFF_MIDDLE)
+    best = squares.reshape(rows, columns, -1).argmax(axis=2)
     row, column = np.indices((rows, columns))
-    spots = np.stack((factor * column + best % factor, factor * row + best // factor), axis=-1) + 0.5
+    row, column = factor * row + best // factor, factor * column + best % factor
+    inside = (row < clear.shape[0]) & (column < clear.shape[1])
+    row_in, column_in = np.minimum(row, clear.shape[0] - 1), np.minimum(column, clear.shape[1] - 1)
+    fits = inside & (clear[row_in, column_in] >= least)
+    spots = np.stack((column, row), axis=-1) + 0.5
     grid = OccupancyMap(world.name, ~fits, factor * world.resolution, world.origin)
-    return GlobalPaths(grid, world.resolution * spots)
+    return GlobalPaths(grid, world.resolution * spots, parts[row_in, column_in])
 
 
 class PathsTo:

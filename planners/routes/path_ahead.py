@@ -81,7 +81,7 @@ class PathAhead:
     def to_go(self, poses: Floats) -> Floats:
         """Return the metres ``[n]`` of shortest paths from ``poses [n, >= 2]``; infinite: no path."""
         metres: Floats = self._at(self._from_beside, poses[:, 0], poses[:, 1])
-        for i in np.flatnonzero(np.isinf(metres)):
+        for i in np.flatnonzero(np.isinf(metres) & ~self._is_free(poses)):
             place = poses[i, :2]
             cells = self._free_cells(place, BESIDE_M)
             ways = self._at(self._to_go, cells[:, 0], cells[:, 1]) + np.hypot(*(cells - place).T)
@@ -97,6 +97,8 @@ class PathAhead:
         best = int(to_go.argmin()) if to_go[0] == math.inf else 0
         if to_go[best] < math.inf:
             return self._paths.path(middles[best])
+        if self._is_free(pose[np.newaxis])[0]:  # but no way leads out of this part of the map
+            return None
         cells = self._free_cells(pose[:2], BESIDE_M)
         cells = cells[np.isfinite(self._at(self._to_go, cells[:, 0], cells[:, 1]))]
         seen = (cell for cell in cells if _in_sight(pose[:2], cell, self._scene))
@@ -115,6 +117,11 @@ class PathAhead:
         order = np.argsort(distances, kind="stable")
         nearest: Floats = spots[order[: np.searchsorted(distances[order], reach, side="right")]]
         return nearest
+
+    def _is_free(self, poses: Floats) -> Flags:
+        """Whether the cell of each of ``poses [n, >= 2]`` is free."""
+        free: Flags = self._at(self._room, poses[:, 0], poses[:, 1]) > 0.0
+        return free
 
     def distance(self, poses: Floats) -> Floats:
         """Return the metres ``[n]`` from ``poses [n, >= 2]`` to the place of the stop."""

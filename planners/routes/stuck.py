@@ -8,7 +8,7 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.widest_way import Gap
 from planners.world.arrays import Point
 
-NARROW: Final = 1.25  # times the width of the widest body: gaps below may be why no plan leads on
+NARROW: Final = 1.25  # times the width of the widest body: gaps below may be why there is no route
 
 
 class Stuck(NamedTuple):
@@ -18,22 +18,28 @@ class Stuck(NamedTuple):
     why: str  # a clause, which "at (x, y)" follows
     attempts: int  # local problems that were tried; 0 if there was nothing to try
     to_go: float | None = None  # metres of the shortest path from there, after a search
-    gap: Gap | None = None  # the narrowest on the widest way to the goal, if the vehicle hardly fits through
+    gap: Gap | None = None  # the narrowest on the widest way from there, if the vehicle hardly fits through
     width: float = 0.0  # metres, of the widest body
 
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
-        line = f"{self.why}, at {_place(self.place, world, scale)}"
+        line = f"{self.why}, at {told_place(self.place, world, scale)}"
         if self.to_go is not None:
-            line += f", {scale * self.to_go:.0f} m before it"
+            line += f", {scale * self.to_go:.{0 if scale * self.to_go >= 10.0 else 1}f} m before it"
         if self.gap is not None:
-            line += (
-                f"; every way there is {scale * self.gap.width:.2f} m wide or less, as at "
-                f"{_place(self.gap.place, world, scale)}, and the vehicle {scale * self.width:.2f} m"
-            )
+            where = told_place(self.gap.place, world, scale)
+            widths = [f"{scale * each:.2f} m" for each in (self.gap.width, self.width)]
+            line += f"; the widest way there narrows to {widths[0]} at most, at {where}"
+            line += f", and the vehicle is {widths[1]} wide"
         return line
 
+    @property
+    def is_too_narrow(self) -> bool:
+        """Whether the vehicle is wider than the gap, and need not try again."""
+        return self.gap is not None and self.gap.width < self.width
 
-def _place(point: Point, world: OccupancyMap, scale: float) -> str:
+
+def told_place(point: Point, world: OccupancyMap, scale: float) -> str:
+    """A place in metres of a map's own frame, of which ``scale`` are a canonical one."""
     x, y, _ = world.pose(scale * point[0], scale * point[1], 0.0)
     return f"({x:.1f}, {y:.1f})"

@@ -30,7 +30,7 @@ AS_MANY = 8  # ... so many times as many as the first one had, ...
 MOST_AGAIN = 8000  # ... and so many at most
 LONG = 0.05  # share of its time by which a drive may take longer than was expected ...
 A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer
-DEAR = 5.0  # seconds that an answer costs beside its time: then it is looked for in a third way
+DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
@@ -70,16 +70,19 @@ def search_and_polish(
         return _searched_and_polished(planner, query, seed, given, below_s)
     rng = copy.deepcopy(query.rng)
 
-    def as_if(driver: Vehicle) -> tuple[Outcome, Plan | None]:
+    def as_if(driver: Vehicle, given: Plan | None) -> tuple[Outcome, Plan | None]:
         limits = replace(query.limits, seconds=max(until - working_clock(), 0.0))
         other = replace(query, vehicle=driver, rng=copy.deepcopy(rng), limits=limits, beside=None)
         return _searched_and_polished(planner, other, seed, given, below_s)
 
-    answers = [_searched_and_polished(planner, query, seed, given, below_s), as_if(counting_time(vehicle))]
+    by_time = counting_time(vehicle)
+    answers = [_searched_and_polished(planner, query, seed, given, below_s), as_if(by_time, given)]
     best = _cheapest(answers, vehicle)[0].plan
     slow = slowed(vehicle, float(start_state(query.problem, vehicle)[3]))
-    if best is not None and slow != vehicle and cost_of(best, vehicle) - best.duration_s > DEAR:
-        answer, rough = as_if(slow)
+    least = min(vehicle.costs.forwards, vehicle.costs.backwards)
+    is_dear = best is not None and cost_of(best, vehicle) - least * best.duration_s > DEAR
+    if is_dear and slow not in (vehicle, by_time):
+        answer, rough = as_if(slow, None)  # a given plan may be faster than it can be
         if answer.plan is not None:
             left = max(until - working_clock(), 0.0)
             around = vehicle, query.scene, query.workspace

@@ -84,8 +84,11 @@ class Source:
 
 
 def class_of(path: Path) -> str:
-    """The class that worlds at a ``path`` are named after. Raises StorageError if it cannot name one."""
-    return checked_name(path.name if path.is_dir() else path.stem)
+    """The class that worlds at a ``path`` are named after, with ``-`` for points as in ``floor-v1.2.yaml``.
+
+    Raises StorageError if it cannot name one.
+    """
+    return checked_name((path.name if path.is_dir() else path.stem).replace(".", "-"))
 
 
 def source_at(path: Path, named: str | None = None) -> Source:

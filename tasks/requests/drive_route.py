@@ -14,7 +14,8 @@ from dashboards.cells import CellTable
 from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
-from planners.routes.route import Route, Router
+from planners.routes.route import Route
+from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.search.query import Limits
 from planners.world.alignment import Alignment, from_canonical
@@ -182,9 +183,9 @@ def _refusal(stuck: Stuck, source: Source, world: OccupancyMap, scale: float, mo
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     line = f"No route across {source.path.name}: {stuck.told(world, scale)}"
     if stuck.attempts == 0:
-        return UsageError(f"{line}; choose another place or heading.")
+        return UsageError(f"{line}." if stuck.is_too_narrow else f"{line}; choose another place or heading.")
     other = "motion at the start, --seed, heading" if moves else "--seed, heading"
-    advice = f"try another {other} or planner" if stuck.gap is None else "it hardly fits through, if at all"
+    advice = "it does not fit through" if stuck.is_too_narrow else f"try another {other} or planner"
     return RunError(f"{line} ({stuck.attempts} local problems tried); {advice}.")
 
 

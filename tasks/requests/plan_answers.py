@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,17 @@ from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, plan_fields, write_plan
 
 LEAST_BACKWARDS_M: Final = 0.05  # less is not worth saying
+
+
+def gears_told(answer: Mapping[str, Any]) -> str:
+    """What is worth saying of gears in the fields of ``plan_answer``, each behind a comma."""
+    gears = answer["gear_changes"]
+    told = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
+    if answer["backwards_m"] >= LEAST_BACKWARDS_M:
+        told += f", {answer['backwards_m']:.1f} m backwards"
+    if answer["cost_s"] != answer["duration_s"]:
+        told += f", costs {answer['cost_s']:.1f} s"
+    return told
 
 
 def write_answer_file(out: Path | None, record: PlanRecord) -> Path | None:

@@ -10,14 +10,13 @@ from planners.attempt import TIMED_PARTS, Attempt
 from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, to_canonical
-from planners.world.driving_cost import metres_backwards
 from planners.world.problem import Plan, Problem
 from storage.exchange.problems import read_problem
 from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import (
-    LEAST_BACKWARDS_M,
+    gears_told,
     meaning_of,
     no_plan,
     plan_answer,
@@ -73,6 +72,8 @@ def plan_one(
             attempt, plan = assistant(problem)
     record = assistant.record(problem, attempt, plan)
     written = write_answer_file(out, record)
+    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
+    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
     if learn is not None:
         remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
@@ -83,9 +84,8 @@ def plan_one(
         from dashboards.figures.style import save_picture
 
         driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
-        back = 0.0 if plan is None else record.scale * metres_backwards(plan, assistant.vehicle)
-        backwards = f", {back:.1f} m backwards" if back >= LEAST_BACKWARDS_M else ""
-        caption = f"{driven}{attempt.source or attempt.status}{backwards}"
+        gears = "" if plan is None else gears_told(answer)
+        caption = f"{driven}{attempt.source or attempt.status}{gears}"
         moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
         figure = picture(
             *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
@@ -97,8 +97,6 @@ def plan_one(
     if plan is None:
         why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
         failure = no_plan(problem.id or str(file), why, out, written)
-    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
-    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
     return PlannedOne(attempt, plan, answer, failure, written)
 
 

@@ -10,7 +10,8 @@ from matplotlib.patches import Circle
 from dashboards.figures.route_picture import route_picture
 from dashboards.figures.stuck_picture import stuck_picture
 from planners.routes.path_ahead import AT_REST, Stop
-from planners.routes.route import Route, Router
+from planners.routes.route import Route
+from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from tests.planners.maps.samples import town
 from tests.planners.routes.test_route import START, searched

@@ -19,7 +19,8 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
 from planners.routes.path_ahead import PathAhead, Stop
-from planners.routes.route import Route, Router
+from planners.routes.route import Route
+from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.search.braking import braking, is_free_drive
 from planners.search.query import Limits

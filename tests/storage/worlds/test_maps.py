@@ -132,3 +132,8 @@ def test_scenarios_find_their_map_beside_them(tmp_path: Path) -> None:
     assert len(parts[0].problems) + len(parts[1].problems) > 0
     (tmp_path / "m.map").unlink()
     assert "which is not beside it" in told(tmp_path / "m.scen")
+
+
+def test_a_name_may_have_points(tmp_path: Path) -> None:
+    write_map(tmp_path / "floor-v1.2.map", town_cells())
+    assert source_at(tmp_path / "floor-v1.2.map").class_name == "floor-v1-2"

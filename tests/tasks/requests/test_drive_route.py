@@ -282,6 +282,7 @@ def test_where_no_route_is_found_the_picture_says_where(town: Path, tmp_path: Pa
     assert not plan.exists()
 
 
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
 def test_a_heavy_vehicle_that_pays_for_driving_backwards_turns_round_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
