@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy import ndimage
 
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
-from planners.world.arrays import Flags, Floats, Integers, Point
+from planners.world.arrays import Flags, Floats, Integers, Point, Pose
 
 
 class Gap(NamedTuple):
@@ -17,6 +18,7 @@ class Gap(NamedTuple):
 
     place: Point  # metres
     width: float  # metres; at most, by up to a cell of the map
+    onward: Point  # metres: where the way leads on, in the wider place behind
 
 
 def narrowest_gap(world: OccupancyMap, start: Point, goal: Point) -> Gap | None:
@@ -42,15 +44,44 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point) -> Gap | None:
         low, high = (middle + 1, high) if _joins(clear >= levels[middle], here, there) else (low, middle)
     if low == 0 or levels[low - 1] == widest:
         return None
-    row, column = _saddle(world, clear, levels[low - 1], here, there)
-    x, y = _middle(world, (row, column)).tolist()
-    return Gap((x, y), 2.0 * world.resolution * float(levels[low - 1]))
+    narrow = float(levels[low - 1])
+    (x, y), (onward_x, onward_y) = (
+        _middle(world, cell).tolist() for cell in _saddle(world, clear, narrow, here, there)
+    )
+    return Gap((x, y), 2.0 * world.resolution * narrow, (onward_x, onward_y))
+
+
+def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
+    """The pose half-way between the occupied cells on both sides of a gap, headed through it.
+
+    None if nothing is occupied on the other side of what is nearest.
+    """
+    x, y = gap.place
+    column, row = int(x / world.resolution), int(y / world.resolution)
+    around = math.ceil(gap.width / world.resolution) + 1
+    low, left = max(row - around, 0), max(column - around, 0)
+    rows, columns = np.nonzero(world.occupied[low : row + around + 1, left : column + around + 1])
+    cells = world.resolution * (np.stack([columns + left, rows + low], axis=1) + 0.5) - gap.place
+    if not len(cells):
+        return None
+    one = cells[np.hypot(*cells.T).argmin()]
+    beyond = cells[cells @ one < 0.0]
+    if not len(beyond):
+        return None
+    other = beyond[np.hypot(*(beyond - one).T).argmin()]
+    across = other - one
+    heading = math.atan2(across[0], -across[1])
+    onward = np.subtract(gap.onward, gap.place)
+    if onward @ (math.cos(heading), math.sin(heading)) < 0.0:
+        heading += math.pi
+    middle = gap.place + 0.5 * (one + other)
+    return float(middle[0]), float(middle[1]), heading
 
 
 def _saddle(
     world: OccupancyMap, clear: Floats, narrow: float, here: tuple[int, int], there: tuple[int, int]
-) -> tuple[int, int]:
-    """The narrowest cell where a way that is ``narrow`` leads out of the room around ``here``."""
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The narrowest cell of a way that is ``narrow`` out of the room around ``here``, and one behind it."""
     paths = GlobalPaths(OccupancyMap(world.name, clear < narrow, world.resolution))
     path = paths.path(_middle(world, here), _middle(world, there))
     assert path is not None
@@ -60,7 +91,8 @@ def _saddle(
     other = int(np.flatnonzero((passed != 0) & (passed != passed[0]))[0])
     between = slice(int(np.flatnonzero(passed[:other] == passed[0])[-1]), other + 1)
     best = between.start + int(clear[cells[between, 0], cells[between, 1]].argmin())
-    return int(cells[best, 0]), int(cells[best, 1])
+    (row, column), (row_behind, column_behind) = cells[[best, other]].tolist()
+    return (row, column), (row_behind, column_behind)
 
 
 def _with_corners(cells: Integers) -> Integers:

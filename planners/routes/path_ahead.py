@@ -48,7 +48,9 @@ class LocalGoal(NamedTuple):
 class PathAhead:
     """The shortest paths over a map's cells to one stop, from anywhere. Lengths are canonical metres."""
 
-    def __init__(self, paths: GlobalPaths, stop: Stop, scene: Scene, start: Floats) -> None:
+    def __init__(
+        self, paths: GlobalPaths, stop: Stop, scene: Scene, start: Floats, briefly: bool = False
+    ) -> None:
         """Find the paths.
 
         Args:
@@ -57,7 +59,9 @@ class PathAhead:
                 way leads to; if none is seen there is no path.
             scene: what is occupied on the map.
             start: ``[>= 2]`` from where the vehicle comes.
+            briefly: whether a pose is never asked for as long as need be.
         """
+        self._briefly = briefly
         self.stop, self._scene, self._grid, self._spots = stop, scene, paths.grid, paths.spots
         self._cell_m = paths.grid.resolution
         free = ~paths.grid.occupied
@@ -155,13 +159,15 @@ class PathAhead:
             place, radius, arrival = self.stop
             if not self.stop.is_pose:
                 goals.append(LocalGoal(place, radius, None, True))
-            goals.append(LocalGoal(place, radius, arrival, True, self.stop.is_pose and along[-1] > NEAR_M))
+            brief = self.stop.is_pose and (self._briefly or along[-1] > NEAR_M)
+            goals.append(LocalGoal(place, radius, arrival, True, brief))
         for reach in REACHES_M:
             within = (along <= reach) & (along >= reach - SOUGHT_M) & (straight <= CANONICAL_DISTANCE)
             if reach < along[-1] and within.any():
                 x, y = path[int(np.where(within, along - TIGHT_M * lacking, -math.inf).argmax())].tolist()
                 goals.append(LocalGoal((x, y), GOAL_RADIUS, None, False))
-        goals += [goal._replace(brief=False) for goal in goals if goal.brief]  # where nothing nearer led on
+        if not self._briefly:  # where nothing nearer led on
+            goals += [goal._replace(brief=False) for goal in goals if goal.brief]
         return goals
 
     def _at(self, values: Floats, x: Floats, y: Floats) -> Floats:

@@ -22,7 +22,7 @@ from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.maps.widest_way import narrowest_gap
+from planners.maps.widest_way import middle_of, narrowest_gap
 from planners.routes.legs import Leg, polished_legs, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
 from planners.routes.route import Route
@@ -37,6 +37,9 @@ from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
     GOAL_RADIUS,
+    POSE_RADIUS,
+    POSE_TOLERANCE,
+    Arrival,
     Problem,
     start_state,
 )
@@ -56,6 +59,7 @@ ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and 
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
+DOORS: Final = 4  # one after another that a vehicle is led through by a pose in each
 POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
 
 BRIEFLY: Final = Limits(expansions=8_000)
@@ -139,7 +143,8 @@ class Router:
             problems[number] = replace(problems[number], start=pose, start_motion=moving)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
-                again = self._legs_around(path, stop, state)
+                through = None if more.to_go is None else self._legs_through(stop, state, DOORS)
+                again = through or self._legs_around(path, stop, state)
                 if again is None:
                     more = more._replace(why=more.why.replace("the goal", goal))
                     return more if more.to_go is None else self._at_a_gap(more, more.place, stop.place)
@@ -155,6 +160,36 @@ class Router:
         grid = self._paths.grid
         wider = ndimage.binary_dilation(grid.occupied, iterations=max(1, round(ROOMY_M / grid.resolution)))
         return GlobalPaths(replace(grid, occupied=wider), self._paths.spots, self._paths.rooms)
+
+    def _legs_through(self, stop: Stop, state: Floats, doors: int) -> list[Leg] | None:
+        """Search the legs to a stop by way of a pose in the narrowest gap ahead, and so on if need be.
+
+        A vehicle that is nearly as wide as a door has to be parked in it: that is a pose like one in a slot.
+        """
+        gap = narrowest_gap(self._world, (float(state[0]), float(state[1])), stop.place)
+        pose = None if gap is None or gap.width > NARROW * self._widest else middle_of(gap, self._world)
+        if pose is None or doors == 0:
+            return None
+        x, y, through = pose
+        ahead = 0.5 * (self._vehicle.front - self._vehicle.rear)  # from the reference point to the middle
+        straight = (0.0,) * len(trailers_of(self._vehicle))
+        tolerances = (POSE_TOLERANCE,) * len(straight)
+        for heading in (through, through + math.pi):
+            place = x - ahead * math.cos(heading), y - ahead * math.sin(heading)
+            arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0, straight, tolerances)
+            parked = Stop(place, POSE_RADIUS, arrival)
+            into = self._legs_to(PathAhead(self._paths, parked, self._scene, state, briefly=True), state)
+            if isinstance(into, Stuck) or not into:
+                continue
+            inside = into[-1].end
+            onward = self._legs_to(PathAhead(self._paths, stop, self._scene, inside), inside)
+            if isinstance(onward, Stuck):
+                again = self._legs_through(stop, inside, doors - 1)
+                if again is None:
+                    continue
+                onward = again
+            return into + onward
+        return None
 
     def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | None:
         """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain."""

@@ -8,7 +8,7 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.widest_way import Gap
 from planners.world.arrays import Point
 
-NARROW: Final = 1.25  # times the width of the widest body: gaps below may be why there is no route
+NARROW: Final = 1.4  # times the width of the widest body: gaps below may be why there is no route
 
 
 class Stuck(NamedTuple):

@@ -20,6 +20,7 @@ SECTIONS: Final = {
     "vehicles": "tests.speed.vehicles",
     "unlike_vehicles": "tests.speed.unlike_vehicles",
     "driving_costs": "tests.speed.driving_costs",
+    "tight_doors": "tests.speed.tight_doors",
     "manoeuvres": "tests.speed.manoeuvres",
     "kin": "tests.speed.kin",
     "peers": "tests.speed.peers.comparison",

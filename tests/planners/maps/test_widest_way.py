@@ -12,7 +12,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
 from planners.maps.occupancy_map import OccupancyMap
-from planners.maps.widest_way import narrowest_gap
+from planners.maps.widest_way import middle_of, narrowest_gap
 
 CELL_M = 0.1
 START, GOAL = (3.0, 8.0), (17.0, 8.0)
@@ -114,3 +114,31 @@ def test_the_width_is_that_of_the_widest_way(seed: int) -> None:
         assert gap.width == pytest.approx(2.0 * narrowest)
         x, y = gap.place
         assert clear[int(y), int(x)] == pytest.approx(narrowest)
+
+
+@given(
+    wide=st.floats(0.8, 2.0),
+    angle=st.floats(-1.2, 1.2),
+    off=st.floats(-3.0, 3.0),
+    thickness=st.floats(0.15, 0.8),
+    backwards=st.booleans(),
+)
+def test_the_pose_in_a_door_is_in_its_middle_and_leads_through(
+    wide: float, angle: float, off: float, thickness: float, backwards: bool
+) -> None:
+    y, x = CELL_M * (np.indices((200, 200)) + 0.5) - 10.0
+    across = x * math.cos(angle) + y * math.sin(angle)
+    along = y * math.cos(angle) - x * math.sin(angle)
+    world = OccupancyMap(
+        "door", (np.abs(across) < 0.5 * thickness) & (np.abs(along - off) > 0.5 * wide), CELL_M
+    )
+    sides = [(10.0 + by * math.cos(angle), 10.0 + by * math.sin(angle)) for by in (-5.0, 5.0)]
+    gap = narrowest_gap(world, *(sides[::-1] if backwards else sides))
+    assert gap is not None
+    pose = middle_of(gap, world)
+    assert pose is not None
+    dx, dy = pose[0] - 10.0, pose[1] - 10.0
+    assert abs(dy * math.cos(angle) - dx * math.sin(angle) - off) <= 1.5 * CELL_M
+    assert abs(dx * math.cos(angle) + dy * math.sin(angle)) <= 0.5 * thickness + 1.5 * CELL_M
+    turned = math.remainder(pose[2] - angle - math.pi * backwards, math.tau)
+    assert abs(turned) <= math.atan2(thickness + 2.0 * CELL_M, wide)

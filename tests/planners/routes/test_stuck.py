@@ -17,7 +17,7 @@ from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from tests.planners.maps.test_widest_way import CELL_M, GOAL, START, walls
 
 
@@ -57,6 +57,24 @@ def test_a_narrower_door_that_is_nearer_leads_nobody_astray() -> None:
     found = Router(OccupancyMap("two", occupied, 0.2), solves).route((3.0, 4.0, 0.0), [Stop((17.0, 4.0))])
     assert isinstance(found, Route)
     assert faults(found.problem, found.plan(CAR)) == []
+
+
+@pytest.mark.parametrize("vehicle", [CAR, CAR_1_TRAILER])
+@pytest.mark.parametrize("resolution", [0.2, 0.25, 0.5])
+def test_a_door_hardly_wider_than_the_vehicle_is_driven_through(resolution: float, vehicle: Vehicle) -> None:
+    """A search for places behind the door seldom finds the way."""
+    occupied = np.zeros((round(20.0 / resolution), round(30.0 / resolution)), bool)
+    column = round(15.0 / resolution)
+    occupied[:, column] = True
+    occupied[round(15.0 / resolution) : round(16.0 / resolution), column] = False
+    world = OccupancyMap("door", occupied, resolution)
+
+    def solver(problem: Problem, limits: Limits) -> Attempt:
+        return solve(problem, "lattice", limits=limits, vehicle=vehicle)
+
+    found = Router(world, solver, vehicle).route((6.0, 4.0, 0.0), [Stop((26.0, 5.0))])
+    assert isinstance(found, Route)
+    assert faults(found.problem, found.plan(vehicle), vehicle) == []
 
 
 def test_it_is_told_in_metres_of_the_map() -> None:
