@@ -1,40 +1,30 @@
-"""Finds a route: one feasible drive to a distant goal, made of local plans that need not end at rest.
-
-The horizon recedes: from the state in which it drives, the vehicle plans to a local goal on the shortest
-path, drives a part of that plan, and plans on from the state that it then has. It changes from one plan to
-the next only where it could also brake. The search is depth first. If no plan leads on from a state, the
-change is made earlier, then another local goal is tried, then the vehicle stops; then the search goes back by
-a leg.
-"""
+"""Finds routes: drives from a state through some stops, along the shortest path or else by other ways."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from scipy import ndimage
 
-from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.maps.widest_way import middle_of, narrowest_gap
-from planners.routes.legs import Leg, polished_legs, stricter
-from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
+from planners.routes.leg_search import LegSearch, Solve
+from planners.routes.legs import Leg, polished_legs
+from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
 from planners.routes.stuck import NARROW, Stuck
-from planners.search.braking import free_stop, is_free_drive
+from planners.search.braking import is_free_drive
 from planners.search.free_goal import lacks_room, unfolded
-from planners.search.query import Limits, usual_limits
-from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
-from planners.world.geometry.collision import count_free_prefix, note_free, point_is_free, scene_of
+from planners.world.geometry.collision import note_free, point_is_free, scene_of
 from planners.world.problem import (
-    CANONICAL_DISTANCE,
     CANONICAL_START,
     GOAL_RADIUS,
     POSE_RADIUS,
@@ -44,27 +34,15 @@ from planners.world.problem import (
     start_state,
 )
 from planners.world.vehicles.bodies import body_count, swept_boxes
-from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR, DifferentialDrive, Trailer, Vehicle, trailers_of
+from planners.world.vehicles.vehicle import CAR, Trailer, Vehicle, trailers_of
 from planners.world.workspace import Workspace
 
-SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
-PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map are no wider
 WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that are tried next ...
 DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
 ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
 OF_OUTLINE: Final = 0.9  # of its width: who does not fill a box may get through what is narrower
-ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
-ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
-RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
-ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
 DOORS: Final = 4  # one after another that a vehicle is led through by a pose in each
-POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
-
-BRIEFLY: Final = Limits(expansions=8_000)
-
-Solve = Callable[[Problem, Limits], Attempt]
 
 
 class Router:
@@ -89,7 +67,6 @@ class Router:
         """
         self._world, self._vehicle, self._polishes = world, vehicle, polishes
         self._workspace = Workspace()
-        self._solve = solve
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
         bounds = (0.0, 0.0, *world.size)
         occupied = self._surroundings.obstacles()
@@ -103,7 +80,7 @@ class Router:
         self._paths = passable(world, fits - 2.0 * tolerance_m, CELL_M)
         self._wider = [cache(partial(passable, world, more * self._widest, CELL_M)) for more in WIDER]
         self._wider.append(cache(self._roomy_paths))
-        self._attempts = self._most_attempts = self._pose_tries = 0
+        self._search = LegSearch(self._surroundings, self._scene, solve, vehicle, world.name)
 
     def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
         """Find a route from a pose (m, m, rad) through all ``stops``.
@@ -129,7 +106,7 @@ class Router:
                 return Stuck(stop.place, f"{who} has no room in the goal pose", 0)
         sections: list[list[Leg]] = []
         paths = []
-        self._attempts = 0
+        self._search.begin()
         for number, stop in enumerate(stops):
             ahead = PathAhead(self._paths, stop, self._scene, state)
             path = ahead.path(state)
@@ -141,7 +118,7 @@ class Router:
                 )
             pose, moving = tuple(state[:3].tolist()), tuple(state[3:].tolist())
             problems[number] = replace(problems[number], start=pose, start_motion=moving)
-            more = self._legs_to(ahead, state)
+            more = self._search.legs_to(ahead, state)
             if isinstance(more, Stuck):
                 through = None if more.to_go is None else self._legs_through(stop, state, DOORS)
                 again = through or self._legs_around(path, stop, state)
@@ -178,11 +155,13 @@ class Router:
             place = x - ahead * math.cos(heading), y - ahead * math.sin(heading)
             arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0, straight, tolerances)
             parked = Stop(place, POSE_RADIUS, arrival)
-            into = self._legs_to(PathAhead(self._paths, parked, self._scene, state, briefly=True), state)
+            into = self._search.legs_to(
+                PathAhead(self._paths, parked, self._scene, state, briefly=True), state
+            )
             if isinstance(into, Stuck) or not into:
                 continue
             inside = into[-1].end
-            onward = self._legs_to(PathAhead(self._paths, stop, self._scene, inside), inside)
+            onward = self._search.legs_to(PathAhead(self._paths, stop, self._scene, inside), inside)
             if isinstance(onward, Stuck):
                 again = self._legs_through(stop, inside, doors - 1)
                 if again is None:
@@ -200,7 +179,7 @@ class Router:
             if other is None:
                 continue
             if wider is self._wider[-1] or length_of(other) > metres + DETOUR_M:
-                legs = self._legs_to(around, state)
+                legs = self._search.legs_to(around, state)
                 if not isinstance(legs, Stuck):
                     return legs
                 metres = length_of(other)
@@ -216,36 +195,6 @@ class Router:
             return "the vehicle"
         return f"trailer {int(free.argmin())}" if bodies > 2 else "the trailer"
 
-    def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
-        """Search the legs from a state to rest at one stop, depth first."""
-        legs: list[Leg] = []
-        options = [self._legs_from(ahead, state)]
-        begun, self._pose_tries = self._attempts, 0
-        self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
-        start = nearest = state
-        while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
-            leg = next(options[-1], None)
-            if leg is not None:
-                legs.append(leg)
-                options.append(self._legs_from(ahead, leg.end))
-            else:
-                options.pop()
-                if not options:
-                    return self._stuck(ahead, start, nearest, max(self._attempts - begun, 1))
-                legs.pop()
-            state = legs[-1].end if legs else start
-            nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
-        return legs
-
-    def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats, tried: int) -> Stuck:
-        """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
-        place = float(nearest[0]), float(nearest[1])
-        if free_stop(start, self._vehicle, self._scene) is None:
-            why = "the vehicle can neither stop in time nor drive on from its motion at the start"
-            return Stuck(place, why, tried)
-        why = "no plan leads on from where the search came nearest to the goal"
-        return Stuck(place, why, tried, float(ahead.to_go(nearest[np.newaxis])[0]))
-
     def _at_a_gap(self, stuck: Stuck, start: Point, goal: Point) -> Stuck:
         """Say of a search that is stuck where the widest way ahead is narrow, if it is."""
         gap = narrowest_gap(self._world, start, goal)
@@ -253,117 +202,7 @@ class Router:
             return stuck
         return stuck._replace(gap=gap, width=self._widest)
 
-    def _rests(self, state: Floats) -> bool:
-        """Whether the vehicle stands, however its wheels are steered; of the first order it stops at once."""
-        turns_on = isinstance(self._vehicle, DifferentialDrive) and not self._vehicle.first_order
-        return bool(np.abs(state[3 : 4 + turns_on]).max() < RESTING)
-
-    def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
-        """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
-        for goal in ahead.local_goals(state):
-            if self._attempts == self._most_attempts:
-                break
-            if goal.final and ahead.stop.is_pose and not goal.brief:
-                if self._pose_tries == POSE_TRIES:
-                    continue
-                self._pose_tries += 1
-            problem = self._problem(state, goal)
-            self._attempts += 1
-            attempt = self._solve(problem, BRIEFLY if goal.brief else usual_limits(problem))
-            if attempt.plan is None:
-                continue
-            states = simulate(state, attempt.plan.controls, self._vehicle)
-            drive = _Drive(states, attempt.plan.controls, attempt, problem, goal)
-            if goal.final and ahead.stop.is_pose:
-                yield from self._arrivals(ahead, drive)
-                continue
-            ends = [self._handovers(ahead, drive), self._stops(ahead, drive)]
-            for legs in reversed(ends) if goal.final else ends:
-                yield from legs
-
-    def _problem(self, state: Floats, goal: LocalGoal) -> Problem:
-        """The local problem, in the canonical frame: a window of the map around start and goal."""
-        x, y, heading = state[:3].tolist()
-        towards = math.atan2(goal.place[1] - y, goal.place[0] - x)
-        distance = math.dist((x, y), goal.place)
-        # metres from the window's start to the vehicle
-        before = 0.5 * max(CANONICAL_DISTANCE - distance, 0.0)
-        cos, sin = math.cos(towards), math.sin(towards)
-        window = self._surroundings.problem(
-            x - before * cos,
-            y - before * sin,
-            towards,
-            f"{self._world.name}-route-{self._attempts}",
-            self._world.name,
-        )
-        along = CANONICAL_START[2]
-        place = before * math.cos(along), before * math.sin(along), along + heading - towards
-        end = (before + distance) * math.cos(along), (before + distance) * math.sin(along)
-        motion = np.where(np.abs(state[3:]) < RESTING, 0.0, state[3:])
-        asked = replace(
-            window,
-            start=place,
-            goal=end,
-            goal_radius=goal.radius,
-            start_motion=tuple(motion.tolist()),
-            arrival=goal.arrival,
-        )
-        if goal.arrival is not None and goal.arrival.heading is not None:
-            heading = along + goal.arrival.heading - towards
-            asked = stricter(replace(asked, arrival=goal.arrival._replace(heading=heading)))
-        return to_canonical(asked)[0]
-
-    def _arrivals(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
-        """Yield a drive to a pose as a whole."""
-        last = drive.states[-1]
-        if is_free_drive(drive.states, self._vehicle, self._scene) and ahead.arrived(last[np.newaxis])[0]:
-            yield drive.leg(len(drive.controls), np.empty((0, 2)), last)
-
-    def _handovers(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
-        """Yield the parts of a drive after which the next plan may begin: there the vehicle could brake."""
-        free = count_free_prefix(drive.states, self._vehicle, self._scene)
-        to_go = ahead.to_go(drive.states)
-        later = free
-        for share in SHARES:
-            for steps in range(min(int(share * (len(drive.states) - 1)), later - 1), 0, -1):
-                if to_go[steps] > to_go[0] - PROGRESS_M:
-                    continue
-                if free_stop(drive.states[steps], self._vehicle, self._scene) is not None:
-                    yield drive.leg(steps, np.empty((0, 2)), drive.states[steps])
-                    later = steps
-                    break
-
-    def _stops(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
-        """Yield the part of a drive after which the vehicle brakes, in the goal disc if it can."""
-        free = count_free_prefix(drive.states, self._vehicle, self._scene)
-        stops = []
-        for steps in range(1, free):
-            stop = free_stop(drive.states[steps], self._vehicle, self._scene)
-            if stop is not None:
-                stops.append((steps, stop.controls, stop.states[-1]))
-        if stops:
-            rests = np.array([end for _, _, end in stops])
-            arrived, to_go = ahead.arrived(rests), ahead.to_go(rests)
-            best = int(np.where(arrived, ahead.distance(rests) - ARRIVED_M, to_go).argmin())
-            if arrived[best] or to_go[best] <= ahead.to_go(drive.states[:1])[0] - PROGRESS_M:
-                yield drive.leg(*stops[best])
-
 
 def _disc_inside(body: Vehicle | Trailer) -> float:
     """How wide a disc is that surely lies inside a body, metres; about as wide as what it gets through."""
     return min(body.width, body.front + body.rear) * (OF_OUTLINE if body.about.outline else 1.0)
-
-
-class _Drive(NamedTuple):
-    """A local plan, driven over the map."""
-
-    states: Floats  # [n + 1, S]
-    controls: Floats  # [n, 2]
-    attempt: Attempt
-    problem: Problem
-    goal: LocalGoal
-
-    def leg(self, steps: int, brake: Floats, end: Floats) -> Leg:
-        """The leg of so many steps of the plan, and then of controls ``brake [m, 2]``."""
-        controls = np.concatenate([self.controls[:steps], brake])
-        return Leg(self.states[0], end, controls, steps, self.attempt, self.problem, self.goal.place)
