@@ -91,7 +91,7 @@ def stuck_picture(
         close_up.set_title("what is around the cross", fontsize=9, color=INK, loc="left", pad=4)
         if standing is None:
             close_up.plot(x, y, **_CROSS, markersize=11, zorder=12)
-        if standing is not None:
+        else:
             bodies, _ = outlines(*standing)
             shown = [placed(world, scale * body) for body in bodies]
             close_up.add_collection(

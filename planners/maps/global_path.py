@@ -76,7 +76,7 @@ def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
         width: of the disc, metres. Cells are at most ``SHARE`` of it, if those of the map are.
         cell_m: width of a cell at most, metres, if those of the map are no wider.
     """
-    clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]  # cells between middles
+    clear = clear_cells(world)
     least = max(0.5 * width / world.resolution - OFF_MIDDLE, MIN_CLEAR)
     parts, _ = ndimage.label(clear >= least, np.ones((3, 3)))  # a door that is too narrow joins none
     factor = max(1, math.floor(min(cell_m, SHARE * width) / world.resolution + 1e-9))
@@ -91,6 +91,12 @@ def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
     spots = np.stack((column, row), axis=-1) + 0.5
     grid = OccupancyMap(world.name, ~fits, factor * world.resolution, world.origin)
     return GlobalPaths(grid, world.resolution * spots, parts[row_in, column_in])
+
+
+def clear_cells(world: OccupancyMap) -> Floats:
+    """How many cells lie between the middle of each and that of the nearest occupied one; all beyond is."""
+    clear: Floats = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]
+    return clear
 
 
 class PathsTo:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from planners.maps.global_path import GlobalPaths
+from planners.maps.global_path import GlobalPaths, clear_cells
 from planners.maps.occupancy_map import OccupancyMap
 from planners.world.arrays import Flags, Floats, Integers, Point, Pose
 
@@ -34,7 +34,7 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point) -> Gap | None:
     Returns:
         The gap; None if there is no way, or nothing on it is narrower than its ends.
     """
-    clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]  # cells between middles
+    clear = clear_cells(world)
     here, there = (_roomiest(world, clear, place) for place in (start, goal))
     levels = np.unique(clear[clear > 0.0])
     widest = min(clear[here], clear[there])

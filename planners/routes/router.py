@@ -14,7 +14,7 @@ from scipy import ndimage
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.maps.widest_way import middle_of, narrowest_gap
+from planners.maps.widest_way import Gap, middle_of, narrowest_gap
 from planners.routes.leg_search import LegSearch, Solve
 from planners.routes.legs import Leg, polished_legs
 from planners.routes.path_ahead import PathAhead, Stop
@@ -143,9 +143,11 @@ class Router:
 
         A vehicle that is nearly as wide as a door has to be parked in it: that is a pose like one in a slot.
         """
-        gap = narrowest_gap(self._world, (float(state[0]), float(state[1])), stop.place)
-        pose = None if gap is None or gap.width > NARROW * self._widest else middle_of(gap, self._world)
-        if pose is None or doors == 0:
+        if doors == 0:
+            return None
+        gap = self._narrow_gap((float(state[0]), float(state[1])), stop.place)
+        pose = None if gap is None else middle_of(gap, self._world)
+        if pose is None:
             return None
         x, y, through = pose
         ahead = 0.5 * (self._vehicle.front - self._vehicle.rear)  # from the reference point to the middle
@@ -197,10 +199,12 @@ class Router:
 
     def _at_a_gap(self, stuck: Stuck, start: Point, goal: Point) -> Stuck:
         """Say of a search that is stuck where the widest way ahead is narrow, if it is."""
+        return stuck._replace(gap=self._narrow_gap(start, goal), width=self._widest)
+
+    def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
+        """Where the widest way is narrowest, if the vehicle hardly fits through there."""
         gap = narrowest_gap(self._world, start, goal)
-        if gap is None or gap.width > NARROW * self._widest:
-            return stuck
-        return stuck._replace(gap=gap, width=self._widest)
+        return gap if gap is not None and gap.width <= NARROW * self._widest else None
 
 
 def _disc_inside(body: Vehicle | Trailer) -> float:

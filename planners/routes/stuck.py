@@ -23,11 +23,11 @@ class Stuck(NamedTuple):
 
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
-        line = f"{self.why}, at {told_place(self.place, world, scale)}"
+        line = f"{self.why}, at {_told_place(self.place, world, scale)}"
         if self.to_go is not None:
             line += f", {scale * self.to_go:.{0 if scale * self.to_go >= 10.0 else 1}f} m before it"
         if self.gap is not None:
-            where = told_place(self.gap.place, world, scale)
+            where = _told_place(self.gap.place, world, scale)
             widths = [f"{scale * each:.2f} m" for each in (self.gap.width, self.width)]
             line += f"; the widest way there narrows to {widths[0]} at most, at {where}"
             line += f", and the vehicle is {widths[1]} wide"
@@ -39,7 +39,7 @@ class Stuck(NamedTuple):
         return self.gap is not None and self.gap.width < self.width
 
 
-def told_place(point: Point, world: OccupancyMap, scale: float) -> str:
+def _told_place(point: Point, world: OccupancyMap, scale: float) -> str:
     """A place in metres of a map's own frame, of which ``scale`` are a canonical one."""
     x, y, _ = world.pose(scale * point[0], scale * point[1], 0.0)
     return f"({x:.1f}, {y:.1f})"
