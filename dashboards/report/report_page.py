@@ -22,7 +22,8 @@ _KINDS: Final = {HOLDS: "holds", FAILS: "fails", OPEN: "open"}
 _MIME: Final = {".svg": "image/svg+xml", ".png": "image/png"}
 _TIMES_NOTE: Final = (
     "Milliseconds from receiving the obstacles to returning a plan; failures count with the time they took. "
-    "Plans are as planners find them; lines that say polished are of plans as plan and solve return them. "
+    "Plans are as planners find them; lines that say polished are of plans as plan and solve return them, "
+    "and of the first 1,000 problems of a class at most. "
     "Hits: the share of problems that a recalled plan fits as it is. Recalled, repaired and searched: where "
     "the answer is from, which may be a quicker one. "
     "Intervals are 95 % bootstrap intervals over problems. Reduction: of the mean, against the same planner "

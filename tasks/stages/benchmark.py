@@ -15,10 +15,17 @@ from tasks.settings.run_settings import ABLATION_PLANNER, UNASSISTED, RunSetting
 from tasks.stages.build_memory import BUILD_MEMORY
 
 CHUNK_PROBLEMS: Final = 100  # about 10 s of work
+POLISHED_PROBLEMS: Final = 1_000  # of a class, the first ones; polishing takes longer than all other attempts
 
 
-def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
-    """Every planner without memory, and with every memory that is measured on a class."""
+def contestants(settings: RunSettings, class_name: str, first: int = 0) -> list[Contestant]:
+    """Every planner without memory, and with every memory that is measured on a class.
+
+    Args:
+        settings: the settings of the run.
+        class_name: the class.
+        first: number of the first problem of a chunk. From ``POLISHED_PROBLEMS`` on nothing is polished.
+    """
     run, everyone = settings.run_name, []
     for planner in settings.planners:
         measured = settings.assists_of(planner)
@@ -29,7 +36,7 @@ def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
             everyone += [Contestant(planner, assist, memory, run) for assist in assists]
         if planner == ABLATION_PLANNER:
             everyone += [Contestant(planner, assist, class_name, run) for assist in settings.ablation]
-    return everyone
+    return [each for each in everyone if first < POLISHED_PROBLEMS or not each.assist.polished]
 
 
 def benchmark_chunk(chunk: Chunk) -> None:
@@ -41,7 +48,7 @@ def benchmark_chunk(chunk: Chunk) -> None:
     }
     source = source_of(chunk.data, settings, name)
     problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
-    rows = side_by_side(problems, settings, contestants(settings, name), memories)
+    rows = side_by_side(problems, settings, contestants(settings, name, chunk.first), memories)
     write_attempts(chunk.shard("results"), rows, key=chunk.key)
 
 
@@ -49,6 +56,7 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     inputs = [
         settings.seed,
         contestants(settings, name),
+        POLISHED_PROBLEMS,
         [BUILD_MEMORY.keys(data, settings, memory) for memory in settings.memories_of(name)],
         *source_key(settings, name),
     ]

@@ -246,3 +246,21 @@ def test_no_attempts_give_an_empty_summary(attempt_rows: pd.DataFrame) -> None:
     summary = summarise(attempt_rows.iloc[:0])
     assert summary.empty
     assert list(summary.columns) == list(summarise(attempt_rows, resamples=2).columns)
+
+
+def test_polished_answers_to_some_of_the_problems_are_compared_on_those_alone() -> None:
+    rows = attempts(("curves",), ("lattice",), [*STANDARD, *POLISHED], 40)
+    polished = rows[rows["polished"]]
+    some = polished[polished["problem_id"].isin(sorted(rows["problem_id"].unique())[:13])]
+    summary = summarise(pd.concat([rows[~rows["polished"]], some]), resamples=10)
+    found = summary[~summary["polished"]].reset_index(drop=True)
+    without = summarise(rows[~rows["polished"]], resamples=10)
+    for table in (found, without):
+        del table["p_value"]  # corrected for all comparisons of its own table
+    pd.testing.assert_frame_equal(found, without, check_dtype=False)
+    alone = summarise(some, resamples=10)
+    assert set(alone["problems"]) == {13}
+    figures = ["problems", "solved", "hit", "mean_ms", "median_ms", "reduction", "sooner_s", "slower"]
+    pd.testing.assert_frame_equal(
+        summary.loc[summary["polished"], figures].reset_index(drop=True), alone[figures], check_dtype=False
+    )
