@@ -5,17 +5,14 @@ from __future__ import annotations
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import pad
 
 from planners.memory.encoder.adamw import AdamW, FlatParameters, one_cycle
 from planners.memory.encoder.encoder import Weights
 from planners.memory.encoder.objectives import Objective
-from planners.memory.encoder.torch_network import embed, embed_all, unpacked
-from planners.memory.plans.cell_masks import CELL_SCORES, MOST_CELLS
+from planners.memory.encoder.torch_network import embed, embed_all
+from planners.memory.plans.cell_masks import CELL_SCORES, count_blocked_cells
 from planners.world.arrays import Flags, Floats32, Integers
-from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, Grid
-
-BATCH = 1024  # problems that are scored at once
+from planners.world.geometry.occupancy import GRID, Bits, Grid, bits_of
 
 LearnerState = tuple[Floats32, Floats32, Floats32, Floats32]
 
@@ -37,13 +34,10 @@ class Learner:
         ``masks [N, 64]`` are the cells that each plan sweeps.
         """
         grids, rows, free = problems
+        self._grids, self._masks = grids, masks
         self._bits = torch.from_numpy(np.ascontiguousarray(grids)).to(device)
         self._rows = torch.from_numpy(rows.astype(np.int64)).to(device)
         self._free = torch.from_numpy(free).to(device)
-        cells = np.unpackbits(np.ascontiguousarray(masks, "<u8").view(np.uint8), axis=1, bitorder="little")
-        self._masks = torch.from_numpy(cells.astype(np.float32)).to(device)  # [N, 4096]
-        self._outside = torch.from_numpy(masks[:, 0] == ALL_CELLS).to(device)
-        self._cell_scores = torch.from_numpy(CELL_SCORES).to(device)
         self._parameters = FlatParameters(weights | own, device)
         self._optimiser = AdamW(self._parameters.values, weight_decay)
         self._best = self._parameters.values.detach().clone()
@@ -55,13 +49,15 @@ class Learner:
         """
         losses = []
         rng = torch.Generator(self._bits.device).manual_seed(self._optimiser.steps)
-        for part in torch.split(torch.from_numpy(order).to(self._bits.device), batch):
+        for first in range(0, len(order), batch):
+            problems = order[first : first + batch]
+            part = torch.from_numpy(problems).to(self._bits.device)
             named = self._parameters.named()
             embeddings = embed(named, self._bits[part])
             if objective.dropout:
                 kept = torch.rand(embeddings.shape, generator=rng, device=embeddings.device)
                 embeddings = embeddings * (kept >= objective.dropout) / (1.0 - objective.dropout)
-            known = self._known(objective, part)
+            known = self._known(objective, problems)
             loss = objective.loss(named, embeddings, self._rows[part], self._free[part], known)
             (gradient,) = torch.autograd.grad(loss, self._parameters.values)
             self._optimiser.step(gradient, one_cycle(self._optimiser.steps, steps, rate))
@@ -75,19 +71,19 @@ class Learner:
         embeddings = embed_all(named, self._bits[sample])
         rows = self._rows[sample]
         vectors, biases = objective.readout(named, embeddings, rows, self._free.shape[1])
-        numbers = torch.from_numpy(problems).to(self._bits.device)
-        known = [self._known(objective, part) for part in torch.split(numbers, BATCH)]
-        scores = embed_all(named, self._bits[problems]) @ vectors.T + biases + torch.cat(known)
+        scores = embed_all(named, self._bits[problems]) @ vectors.T + biases
+        scores += self._known(objective, problems)
         return _array(scores[:, 1:])
 
-    def _known(self, objective: Objective, problems: Tensor) -> Tensor:
+    def _known(self, objective: Objective, problems: Integers) -> Tensor:
         """What blocked cells add to the scores of ``problems [m]``: ``[m, N + 1]``."""
-        if not objective.by_cells:
-            return torch.zeros((len(problems), len(self._masks) + 1), device=self._bits.device)
-        grids = unpacked(self._bits[problems]).view(-1, GRID * GRID)
-        blocked = (grids @ self._masks.T).long().clamp(max=MOST_CELLS)
-        blocked.masked_fill_(self._outside, MOST_CELLS)
-        return pad(self._cell_scores[blocked], (1, 0))
+        known = np.zeros((len(problems), len(self._masks) + 1), np.float32)
+        if objective.by_cells:
+            blocked = np.empty((len(problems), len(self._masks)), np.int32)
+            grids = np.unpackbits(self._grids[problems], axis=1).reshape(-1, GRID, GRID)
+            count_blocked_cells(self._masks, bits_of(grids), blocked)
+            known[:, 1:] = CELL_SCORES[blocked]
+        return torch.from_numpy(known).to(self._bits.device)
 
     def keep(self) -> None:
         """Keep the present parameters as the best so far."""

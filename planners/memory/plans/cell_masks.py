@@ -73,6 +73,28 @@ def count_bits(word: np.uint64) -> np.uint64:
     return np.uint64((word * _LOW) >> np.uint64(56))
 
 
+@inlined
+def blocked_cells(masks: Bits, i: int, occupied: Bits) -> int:
+    """Count the cells of plan ``i`` that are not free, at most MOST_CELLS: also if it leaves the window."""
+    if masks[i, 0] == ALL_CELLS:
+        return MOST_CELLS
+    count = np.uint64(0)
+    for row in range(GRID):
+        count += count_bits(masks[i, row] & occupied[row])
+    return min(int(np.int64(count)), MOST_CELLS)  # with an unsigned number Numba would make floats
+
+
+@lean
+def count_blocked_cells(masks: Bits, occupied: Bits, counts: Integers) -> None:
+    """Count the blocked cells ``counts [n, N]`` of N plans in n problems.
+
+    ``masks [N, 64]``: the cells that each plan sweeps; ``occupied [n, 64]``: those that are not free.
+    """
+    for problem in range(occupied.shape[0]):
+        for i in range(masks.shape[0]):
+            counts[problem, i] = blocked_cells(masks, i, occupied[problem])
+
+
 class Ranking(NamedTuple):
     """N plans by the number of their swept cells that are not free."""
 
@@ -89,17 +111,6 @@ def allocate_ranking(count: int) -> Ranking:
 def allocate_tries(count: int) -> Integers:
     """A buffer for the numbers of at most ``count`` plans."""
     return np.empty(count, np.int32)
-
-
-@inlined
-def blocked_cells(masks: Bits, i: int, occupied: Bits) -> int:
-    """Count the cells of plan ``i`` that are not free, at most MOST_CELLS: also if it leaves the window."""
-    if masks[i, 0] == ALL_CELLS:
-        return MOST_CELLS
-    count = np.uint64(0)
-    for row in range(GRID):
-        count += count_bits(masks[i, row] & occupied[row])
-    return min(int(np.int64(count)), MOST_CELLS)  # with an unsigned number Numba would make floats
 
 
 @lean

@@ -214,6 +214,7 @@ def test_training_leaves_torch_as_it_was():
     train(*problems(50), settings("labels"))
     assert torch.get_num_threads() == threads
     assert torch.are_deterministic_algorithms_enabled() == deterministic
+    assert torch.utils.deterministic.fill_uninitialized_memory
 
 
 def test_what_cannot_be_trained_is_refused():

@@ -7,7 +7,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.cell_masks import MOST_CELLS, masks_of, rank_by_cells, rank_to_try
+from planners.memory.plans.cell_masks import (
+    MOST_CELLS,
+    count_blocked_cells,
+    masks_of,
+    rank_by_cells,
+    rank_to_try,
+)
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
@@ -52,6 +58,18 @@ def test_masks_are_the_cells_that_the_sweep_meets(seed):
     apart = shapely.distance(shapely.box(left, bottom, left + 1, bottom + 1), sweep)
     assert drawn[shared > 1e-6].all()
     assert not drawn[apart > 1e-5].any()
+
+
+@given(seed=SEEDS, problems=st.integers(0, 5), plans=st.integers(1, 7), share=st.floats(0.0, 1.0))
+def test_blocked_cells_are_those_that_both_have(seed, problems, plans, share):
+    rng = generator(seed, "blocked")
+    swept, occupied = rng.random((plans, 64, 64)) < 0.3, rng.random((problems, 64, 64)) < share
+    swept[0] = seed % 2  # leaves the window, or sweeps nothing
+    blocked = np.empty((problems, plans), np.int32)
+    count_blocked_cells(bits_of(swept), bits_of(occupied), blocked)
+    shared = np.minimum((swept & occupied[:, None]).sum((2, 3)), MOST_CELLS)
+    shared[:, swept.all((1, 2))] = MOST_CELLS
+    assert np.array_equal(blocked, shared)
 
 
 @given(seed=SEEDS, count=st.integers(0, 40))
