@@ -222,6 +222,9 @@ def route(
     request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius)
     driven = drive_route(path, format, request, assistant, settings, out, picture)
     write_for_people(options.vehicle_line(assistant.settings))
-    write(driven.legs)
+    if driven.legs is not None:
+        write(driven.legs)
     write_answer(*driven.summary, **driven.answer)
-    write_files(plan=out, picture=picture)
+    write_files(plan=out if driven.failure is None else None, picture=picture)
+    if driven.failure is not None:
+        raise driven.failure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.widest_way import Gap
@@ -33,6 +33,20 @@ class Stuck(NamedTuple):
             line += f", and the vehicle is {widths[1]} wide"
         return line
 
+    def fields(self, world: OccupancyMap, scale: float) -> dict[str, Any]:
+        """The same for programs, as JSON values."""
+        gap = None
+        if self.gap is not None:
+            gap = {"place": _in_map(self.gap.place, world, scale), "width_m": scale * self.gap.width}
+        return {
+            "why": self.why,
+            "place": _in_map(self.place, world, scale),
+            "to_go_m": None if self.to_go is None else scale * self.to_go,
+            "gap": gap,
+            "vehicle_width_m": scale * self.width if gap else None,
+            "local_plans": self.attempts,
+        }
+
     @property
     def is_too_narrow(self) -> bool:
         """Whether the vehicle is wider than the gap, and need not try again."""
@@ -41,5 +55,10 @@ class Stuck(NamedTuple):
 
 def _told_place(point: Point, world: OccupancyMap, scale: float) -> str:
     """A place in metres of a map's own frame, of which ``scale`` are a canonical one."""
-    x, y, _ = world.pose(scale * point[0], scale * point[1], 0.0)
+    x, y = _in_map(point, world, scale)
     return f"({x:.1f}, {y:.1f})"
+
+
+def _in_map(point: Point, world: OccupancyMap, scale: float) -> Point:
+    x, y, _ = world.pose(scale * point[0], scale * point[1], 0.0)
+    return x, y

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -36,7 +35,6 @@ from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
-_LOG: Final = logging.getLogger(__name__)
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
 
 
@@ -57,11 +55,12 @@ class _Solver:
 
 
 class DrivenRoute(NamedTuple):
-    """A route, as its legs and as a whole."""
+    """A route, as its legs and as a whole, or why there is none."""
 
-    legs: CellTable
+    legs: CellTable | None
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
-    answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of
+    answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of ...
+    failure: UsageError | RunError | None = None  # ... or, if there is none, those of ``Stuck.fields``
 
 
 def drive_route(
@@ -87,7 +86,6 @@ def drive_route(
     Raises:
         UsageError: an option is malformed, start or goal cannot be used, or an output would be written over
             an input.
-        RunError: no route was found.
         PlanFaultError: the independent judge refuses the route.
     """
     check_plan_file(out)
@@ -131,8 +129,8 @@ def drive_route(
             from dashboards.figures.style import save_picture
 
             save_picture(stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle), drawing)
-            _LOG.info("picture  %s", drawing)
-        raise _refusal(route, source, world, scale, any(motion))
+        failure = _refusal(route, source, world, scale, any(motion))
+        return DrivenRoute(None, [], {"status": "stuck"} | route.fields(world, scale), failure)
     plan = route.plan(assistant.vehicle)
     _check(route, plan, assistant)
     record = _record(route, plan, world, assistant, seconds, scale)
@@ -179,7 +177,9 @@ def _drive_mirrored(
     across.route((width - x, y, math.pi - heading), asked, turned)
 
 
-def _refusal(stuck: Stuck, source: Source, world: OccupancyMap, scale: float, moves: bool) -> Exception:
+def _refusal(
+    stuck: Stuck, source: Source, world: OccupancyMap, scale: float, moves: bool
+) -> UsageError | RunError:
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     line = f"No route across {source.path.name}: {stuck.told(world, scale)}"
     if stuck.attempts == 0:

@@ -282,6 +282,27 @@ def test_where_no_route_is_found_the_picture_says_where(town: Path, tmp_path: Pa
     assert not plan.exists()
 
 
+def test_programs_are_told_where_a_route_is_stuck_and_how_narrow_it_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two rooms of 20 m with a door of half a metre between them, one cell wide."""
+    cells = np.zeros((40, 82), bool)
+    cells[:, 40:42] = True
+    cells[20, 40:42] = False
+    np.save(tmp_path / "rooms.npy", cells)
+    asked = ["route", str(tmp_path / "rooms.npy"), "--resolution", "0.5", "--scale", "2"]
+    asked += ["--from", "5,5,0", "--to", "36,5"]
+    assert call([*asked, "--json"]) != 0
+    told = json.loads(capsys.readouterr().out)
+    answer = told["answer"]
+    assert answer["status"] == "stuck"
+    assert answer["why"] in told["error"]
+    assert 0.5 <= answer["gap"]["width_m"] <= 1.0
+    assert answer["vehicle_width_m"] == 2 * CAR.width
+    assert answer["gap"]["place"] == pytest.approx([20.5, 10.0], abs=1.0)
+    assert "plan" not in told["files"]
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
 def test_a_heavy_vehicle_that_pays_for_driving_backwards_turns_round_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
