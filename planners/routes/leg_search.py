@@ -22,6 +22,7 @@ from planners.routes.legs import Leg, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead
 from planners.routes.stuck import Stuck
 from planners.search.braking import free_stop, is_free_drive
+from planners.search.outcome import Status
 from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
@@ -64,12 +65,13 @@ class LegSearch:
     def begin(self) -> None:
         """Begin another route: its local problems are counted, and named, from 0."""
         self._attempts = self._most_attempts = self._pose_tries = 0
+        self._is_enclosed = False
 
     def legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""
         legs: list[Leg] = []
         options = [self._legs_from(ahead, state)]
-        begun, self._pose_tries = self._attempts, 0
+        begun, self._pose_tries, self._is_enclosed = self._attempts, 0, False
         self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
         start = nearest = state
         while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
@@ -89,6 +91,9 @@ class LegSearch:
     def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats, tried: int) -> Stuck:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
         place = float(nearest[0]), float(nearest[1])
+        if self._is_enclosed:
+            why = "every drive out of the goal pose ends near it, so hardly any leads there"
+            return Stuck(ahead.stop.place, why, tried, is_enclosed=True)
         if free_stop(start, self._vehicle, self._scene) is None:
             why = "the vehicle can neither stop in time nor drive on from its motion at the start"
             return Stuck(place, why, tried)
@@ -103,7 +108,7 @@ class LegSearch:
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
-            if self._attempts == self._most_attempts:
+            if self._attempts == self._most_attempts or self._is_enclosed:
                 break
             if goal.final and ahead.stop.is_pose and not goal.brief:
                 if self._pose_tries == POSE_TRIES:
@@ -113,6 +118,7 @@ class LegSearch:
             self._attempts += 1
             attempt = self._solve(problem, BRIEFLY if goal.brief else usual_limits(problem))
             if attempt.plan is None:
+                self._is_enclosed = goal.final and attempt.status == Status.GOAL_ENCLOSED
                 continue
             states = simulate(state, attempt.plan.controls, self._vehicle)
             drive = _Drive(states, attempt.plan.controls, attempt, problem, goal)

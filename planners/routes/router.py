@@ -120,8 +120,10 @@ class Router:
             problems[number] = replace(problems[number], start=pose, start_motion=moving)
             more = self._search.legs_to(ahead, state)
             if isinstance(more, Stuck):
-                through = None if more.to_go is None else self._legs_through(stop, state, DOORS)
-                again = through or self._legs_around(path, stop, state)
+                again = None
+                if not more.is_enclosed:
+                    through = None if more.to_go is None else self._legs_through(stop, state, DOORS)
+                    again = through or self._legs_around(path, stop, state)
                 if again is None:
                     more = more._replace(why=more.why.replace("the goal", goal))
                     return more if more.to_go is None else self._at_a_gap(more, more.place, stop.place)

@@ -20,6 +20,7 @@ class Stuck(NamedTuple):
     to_go: float | None = None  # metres of the shortest path from there, after a search
     gap: Gap | None = None  # the narrowest on the widest way from there, if the vehicle hardly fits through
     width: float = 0.0  # metres, of the widest body
+    is_enclosed: bool = False  # whether no drive leads far out of the goal pose: then no other way helps
 
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""

@@ -14,7 +14,7 @@ from planners.search.braking import stopping
 from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.manoeuvres.squeezing import squeeze
 from planners.search.manoeuvres.suitability import suits
-from planners.search.outcome import Other, Outcome
+from planners.search.outcome import Other, Outcome, Status
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
 from planners.search.rrt import growing
@@ -229,6 +229,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + working_clock() - began,
         )
+    if outcome.plan is None and manoeuvring is not None and manoeuvring.is_enclosed:
+        outcome = replace(outcome, status=Status.GOAL_ENCLOSED)
     outcome = replace(outcome, expected_s=expected_s)
     if joining is None:
         return outcome

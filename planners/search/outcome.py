@@ -25,6 +25,7 @@ class Status(StrEnum):
     START_BLOCKED = "start-blocked"
     GOAL_BLOCKED = "goal-blocked"
     INFEASIBLE = "infeasible"  # it is certain that no drive leads to the goal
+    GOAL_ENCLOSED = "goal-enclosed"  # all that was found out of the goal pose ends near it
 
 
 MEANINGS: Final = {
@@ -33,6 +34,7 @@ MEANINGS: Final = {
     Status.START_BLOCKED: "at the start the vehicle meets an obstacle or the bounds",
     Status.GOAL_BLOCKED: "no place in the goal is free",
     Status.INFEASIBLE: "it is certain that no drive leads there",
+    Status.GOAL_ENCLOSED: "out of the goal pose every drive ends near it, so hardly any leads there",
 }  # of an attempt without a plan, for people
 
 

@@ -186,7 +186,10 @@ def _refusal(
         return UsageError(f"{line}." if stuck.is_too_narrow else f"{line}; choose another place or heading.")
     other = "motion at the start, --seed, heading" if moves else "--seed, heading"
     advice = "it does not fit through" if stuck.is_too_narrow else f"try another {other} or planner"
-    return RunError(f"{line} ({stuck.attempts} local problems tried); {advice}.")
+    if stuck.is_enclosed:
+        advice = "choose another place or heading"
+    tried = f"{stuck.attempts} local problem{'s' * (stuck.attempts != 1)} tried"
+    return RunError(f"{line} ({tried}); {advice}.")
 
 
 def _check(route: Route, plan: Plan, assistant: Assistant) -> None:

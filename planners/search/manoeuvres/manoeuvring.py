@@ -17,7 +17,15 @@ from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
 from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
-from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
+from planners.search.manoeuvres.pose_tree import (
+    CHECKS,
+    NODES,
+    SIZE,
+    PoseTree,
+    allocate_pose_tree,
+    plant_root,
+    pose_of,
+)
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
 from planners.search.manoeuvres.variants import (
@@ -149,6 +157,16 @@ class Manoeuvring:
     def is_over(self) -> bool:
         """Whether nothing is left to try."""
         return self._level == len(LEVELS)
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether all drives out of the goal ended near it, however fine, before any reached the bounds."""
+        size = int(self._tree.counts[SIZE])
+        if not self.is_over or self.kept or size == NODES:
+            return False
+        places, bounds = self._tree.states[:size, :2], np.array(self._query.problem.bounds)
+        room = np.minimum(places.min(0) - bounds[:2], bounds[2:] - places.max(0)).min()
+        return bool(room > self._vehicle.front + self._vehicle.rear)
 
     @property
     def is_stuck(self) -> bool:

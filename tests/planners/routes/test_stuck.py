@@ -16,7 +16,7 @@ from planners.routes.stuck import Stuck
 from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.authority.authority import faults
-from planners.world.problem import Problem
+from planners.world.problem import Arrival, Problem
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from tests.planners.maps.test_widest_way import CELL_M, GOAL, START, walls
 
@@ -87,3 +87,15 @@ def test_it_is_told_in_metres_of_the_map() -> None:
         assert f"({100.0 + 4.0 * x:.1f}, {4.0 * y:.1f})" in told
     for metres in (f"{4.0 * stuck.to_go:.0f}", f"{4.0 * stuck.gap.width:.2f}", f"{4.0 * CAR.width:.2f}"):
         assert f" {metres} m" in told
+
+
+def test_a_slot_that_nobody_gets_out_of_is_asked_for_once() -> None:
+    """A slot at the kerb of a street, 0.1 m longer than the car."""
+    occupied = np.zeros((150, 400), bool)
+    occupied[:22] = occupied[-10:] = True
+    occupied[10:22, 200:221] = False
+    goal = Stop((20.25, 1.62), 0.1, Arrival(0.0, 0.05, 0.0, 0.0))
+    kerb = Router(OccupancyMap("kerb", occupied, 0.1), solves)
+    stuck = kerb.route((8.0, 8.0, 0.0), [goal])
+    assert isinstance(stuck, Stuck)
+    assert (stuck.is_enclosed, stuck.attempts, stuck.place) == (True, 1, goal.place)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
 from planners.search.manoeuvres import suitability
+from planners.search.outcome import Status
 from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.solve import solve
 from planners.world.alignment import to_canonical
+from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.families import Family, family
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Arrival, Plan, Problem, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.vehicles.vehicle_files import said_vehicle
@@ -110,3 +113,44 @@ def test_a_trailer_is_backed_to_a_dock() -> None:
         found = plan("lattice", problem, generator(0), limits=LIMITS, vehicle=CAR_1_TRAILER).plan
         assert found is not None
         assert faults(problem, found, CAR_1_TRAILER) == []
+
+
+def at_the_kerb(length: float) -> Problem:
+    """Into a slot of a ``length`` between two vehicles, 0.3 m deeper than the car is wide."""
+    kerb, deep = obstacle(0, -1, 50, 0), CAR.width + 0.3
+    row = obstacle(0, 0, 20, deep), obstacle(20 + length, 0, 50, deep), obstacle(0, deep + 4, 50, deep + 5)
+    middle = 20 + 0.5 * length - 0.5 * (CAR.front - CAR.rear)
+    goal, inside = (middle, 0.15 + 0.5 * CAR.width), Arrival(0.0, 0.05, 0.0, 0.0)
+    bounds = (-10.0, -10.0, 60.0, 20.0)
+    obstacles = obstacles_of([[each] for each in (kerb, *row)])
+    return Problem("kerb", "kerb", (8.0, deep + 2.0, 0.0), goal, 0.1, bounds, obstacles, arrival=inside)
+
+
+def obstacle(left: float, low: float, right: float, high: float) -> Floats:
+    return np.array([[left, low], [right, low], [right, high], [left, high]], float)
+
+
+@pytest.mark.parametrize(("room", "fits"), [(0.05, False), (0.1, False), (0.4, True), (0.6, True)])
+def test_who_cannot_get_into_a_slot_is_told_that_nobody_gets_out_of_it(room: float, fits: bool) -> None:
+    inwards = at_the_kerb(CAR.front + CAR.rear + room)
+    x, y, heading = inwards.start
+    outwards = replace(
+        inwards, start=(*inwards.goal, 0.0), goal=(x, y), arrival=Arrival(heading, 0.05, 0.0, 0.0)
+    )
+    into, out = (solve(to_canonical(each)[0], "lattice") for each in (inwards, outwards))
+    assert into.status == (Status.SOLVED if fits else Status.GOAL_ENCLOSED)
+    assert out.solved == fits
+    assert out.status != Status.GOAL_ENCLOSED  # there is room in the street
+
+
+def test_a_goal_in_a_lane_that_leads_out_of_sight_is_not_called_enclosed() -> None:
+    """The start lies behind a wall, and the lane of the goal ends beyond the bounds."""
+    lane = obstacle(20, 0, 60, 1), obstacle(20, 2.4, 60, 3.4), obstacle(20, 1, 21, 2.4)
+    bounds = (-10.0, -20.0, 60.0, 20.0)
+    problem = Problem(
+        *("lane", "lane", (8.0, 2.0, 0.0), (30.0, 1.7), 0.1, bounds, obstacles_of([[each] for each in lane])),
+        arrival=Arrival(0.0, 0.05, 0.0, 0.0),
+    )
+    found = solve(to_canonical(problem)[0], "lattice", limits=Limits(expansions=20_000))
+    assert not found.solved
+    assert found.status != Status.GOAL_ENCLOSED
