@@ -97,10 +97,14 @@ def asked_pose(goal: Point, arrival: Arrival | None, vehicle: Vehicle = CAR) -> 
 
 def footprint_spacing_m(vehicle: Vehicle) -> float:
     """The distance along a plan from one footprint of ``vehicle`` to the next, in whole metres."""
+    return float(math.ceil(whole_length_m(vehicle) + _CLEAR_M))
+
+
+def whole_length_m(vehicle: Vehicle) -> float:
+    """How long a ``vehicle`` is with all of its trailers, straight."""
     trailers = trailers_of(vehicle)
     rear = trailers[-1].rear if trailers else vehicle.rear
-    length = vehicle.front + sum(trailer.hitch_length for trailer in trailers) + rear
-    return float(math.ceil(length + _CLEAR_M))
+    return vehicle.front + sum(trailer.hitch_length for trailer in trailers) + rear
 
 
 def shown_states(plan: Plan, vehicle: Vehicle = CAR) -> Floats:

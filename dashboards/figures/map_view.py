@@ -22,7 +22,7 @@ from planners.world.arrays import Floats, Pose
 from planners.world.vehicles.vehicle import Vehicle
 
 OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
-CLOSE_UP_LENGTHS: Final = 1.5  # of the vehicle to each side of its middle
+CLOSE_UP_LENGTHS: Final = 2.5  # of the vehicle to each side of the place
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
 _CLOSE_UPS: Final = 3  # side by side, at most

@@ -29,7 +29,7 @@ from dashboards.figures.marks import draw_travel_arrows
 from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below
 from dashboards.palette import BLUE, INK, ORANGE, VERMILLION
-from dashboards.world_outlines import footprint_spacing_m
+from dashboards.world_outlines import whole_length_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
@@ -140,7 +140,7 @@ def _arrivals(
 
     All is turned as the map's frame is, in canonical metres.
     """
-    length = footprint_spacing_m(vehicle)
+    length = whole_length_m(vehicle)
     reach = CLOSE_UP_LENGTHS * length
     (left, bottom, turn), arrivals = world.origin, list[tuple[str, Problem, Plan]]()
     frame = Alignment((left / scale, bottom / scale), -turn)

@@ -22,7 +22,7 @@ from dashboards.figures.map_view import (
 )
 from dashboards.figures.style import legend_below
 from dashboards.palette import INK, VERMILLION
-from dashboards.world_outlines import asked_pose, footprint_spacing_m, outlines
+from dashboards.world_outlines import asked_pose, outlines, whole_length_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.stuck import Stuck
@@ -73,7 +73,15 @@ def stuck_picture(
     handles = draw_ends(axes, world, start, stops, scale, view.longest)
     for close_up in close_ups:
         axes.plot(x, y, **_CROSS, markersize=11, zorder=12)
-        handles.append(Line2D([], [], **_CROSS, markersize=9, label="stuck here"))
+        handles.append(
+            Line2D(
+                [],
+                [],
+                **_CROSS,
+                markersize=9,
+                label="nobody gets out of here" if stuck.is_enclosed else "stuck here",
+            )
+        )
         if stuck.gap is not None:
             right, up = stuck.gap.place
             right, up, _ = world.pose(scale * right, scale * up, 0.0)
@@ -81,7 +89,7 @@ def stuck_picture(
                 each.plot(right, up, **_GAP, markersize=9, zorder=11)
             handles.append(Line2D([], [], **_GAP, markersize=8, label="narrowest place of the widest way"))
         standing = _standing_at(stuck.place, start, stops, vehicle)
-        reach = CLOSE_UP_LENGTHS * scale * footprint_spacing_m(vehicle if standing is None else standing[1])
+        reach = CLOSE_UP_LENGTHS * scale * whole_length_m(vehicle if standing is None else standing[1])
         draw_map(close_up, world, OCCUPIED)
         close_up.set_xlim(x - reach, x + reach)
         close_up.set_ylim(y - reach, y + reach)

@@ -64,8 +64,9 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
         sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
         returned = _by_planner(used_by_default(as_returned(every))).get(first)
         if returned is not None:
+            on = "" if returned["problems"] == now["problems"] else f" (on {returned['problems']:,} of them)"
             sentences.append(
-                f"Answers are polished before they are returned: then the robot {_arrival(returned)}."
+                f"Answers are polished before they are returned: then the robot {_arrival(returned)}{on}."
             )
         if rows["problems"].max() < FEW:
             sentences.append("So few problems say little.")

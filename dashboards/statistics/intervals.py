@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -45,13 +48,15 @@ def bootstrap(
     sums = np.empty((summands.shape[0], resamples))
     middle = np.empty((values.shape[1], resamples if interquartile else 0))
     first = 0
-    for counts in _resamples(len(values), seed, resamples):
-        here = slice(first, first + counts.shape[1])
-        sums[:, here] = summands @ counts
-        if interquartile:
-            for column, mine in zip(values.T, middle, strict=True):
-                mine[here] = resampled_interquartile_mean(column, counts)
-        first = here.stop
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for counts in _resamples(len(values), seed, resamples):
+            here = slice(first, first + counts.shape[1])
+            sums[:, here] = summands @ counts
+            if interquartile:
+                means = threads.map(partial(resampled_interquartile_mean, counts=counts), values.T)
+                for mine, of_column in zip(middle, means, strict=True):
+                    mine[here] = of_column
+            first = here.stop
     total, attempted, mine, without = np.split(sums.T, 4, axis=1)
     return Resampled(ratio(total, attempted), 1.0 - ratio(mine, without), middle.T)
 

@@ -30,7 +30,7 @@ from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_run
 from storage.places.files import read_json, read_text
 from storage.places.mirror import folders_in
-from storage.places.run_folder import NAME, RunFolder
+from storage.places.run_folder import NAME, RunFolder, worlds_name
 from storage.tables.attempts import readable_attempts
 from storage.tables.imported_problems import read_imported
 from storage.vehicles.vehicle_files import said_vehicle
@@ -196,8 +196,7 @@ class DataReader:
 
 def class_names(settings: Mapping[str, Any]) -> list[str]:
     """The classes of a run by its ``settings``: the generated ones, then its worlds and maps."""
-    worlds = [Path(str(world)) for world in settings["worlds"]]
-    return [*settings["classes"], *(path.name if path.is_dir() else path.stem for path in worlds)]
+    return [*settings["classes"], *(worlds_name(Path(str(world))) for world in settings["worlds"])]
 
 
 def _has_attempts(run: RunFolder) -> bool:

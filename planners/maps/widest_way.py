@@ -6,11 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
 
-from planners.maps.global_path import GlobalPaths, clear_cells
+from planners.maps.global_path import clear_cells
 from planners.maps.occupancy_map import OccupancyMap
-from planners.world.arrays import Flags, Floats, Integers, Point, Pose
+from planners.world.arrays import Flags, Floats, Point, Pose
+
+Cell = tuple[int, int]  # row, column
 
 
 class Gap(NamedTuple):
@@ -21,7 +24,7 @@ class Gap(NamedTuple):
     onward: Point  # metres: where the way leads on, in the wider place behind
 
 
-def narrowest_gap(world: OccupancyMap, start: Point, goal: Point) -> Gap | None:
+def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, most: float = math.inf) -> Gap | None:
     """Find what is narrowest on the widest way between two places.
 
     A way begins and ends where there is most room around: uphill from each place, away from what is occupied.
@@ -30,25 +33,26 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point) -> Gap | None:
         world: the map.
         start: metres.
         goal: metres.
+        most: metres; wider gaps are of no interest.
 
     Returns:
-        The gap; None if there is no way, or nothing on it is narrower than its ends.
+        The gap; None if there is no way, or nothing on it is narrower than its ends and than ``most``.
     """
     clear = clear_cells(world)
     here, there = (_roomiest(world, clear, place) for place in (start, goal))
-    levels = np.unique(clear[clear > 0.0])
-    widest = min(clear[here], clear[there])
-    low, high = 0, int(np.searchsorted(levels, widest, side="right"))
+    is_narrow = (clear > 0.0) & (clear < min(clear[here], clear[there]))
+    levels = np.unique(clear[is_narrow & (clear <= 0.5 * most / world.resolution)])
+    if not len(levels) or _joins(clear > levels[-1], here, there):
+        return None
+    low, high = 0, len(levels)
     while high > low:  # ways as wide as the levels below low are there, those from high on are not
         middle = (low + high) // 2
         low, high = (middle + 1, high) if _joins(clear >= levels[middle], here, there) else (low, middle)
-    if low == 0 or levels[low - 1] == widest:
+    if low == 0:
         return None
     narrow = float(levels[low - 1])
-    (x, y), (onward_x, onward_y) = (
-        _middle(world, cell).tolist() for cell in _saddle(world, clear, narrow, here, there)
-    )
-    return Gap((x, y), 2.0 * world.resolution * narrow, (onward_x, onward_y))
+    place, onward = (_middle(world, cell) for cell in _saddle(clear, narrow, here, there))
+    return Gap(place, 2.0 * world.resolution * narrow, onward)
 
 
 def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
@@ -78,32 +82,39 @@ def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
     return float(middle[0]), float(middle[1]), heading
 
 
-def _saddle(
-    world: OccupancyMap, clear: Floats, narrow: float, here: tuple[int, int], there: tuple[int, int]
-) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The narrowest cell of a way that is ``narrow`` out of the room around ``here``, and one behind it."""
-    paths = GlobalPaths(OccupancyMap(world.name, clear < narrow, world.resolution))
-    path = paths.path(_middle(world, here), _middle(world, there))
-    assert path is not None
-    cells = _with_corners(np.floor(path[:, ::-1] / world.resolution).astype(int))
-    rooms, _ = ndimage.label(clear > narrow)
-    passed = rooms[cells[:, 0], cells[:, 1]]
-    other = int(np.flatnonzero((passed != 0) & (passed != passed[0]))[0])
-    between = slice(int(np.flatnonzero(passed[:other] == passed[0])[-1]), other + 1)
-    best = between.start + int(clear[cells[between, 0], cells[between, 1]].argmin())
-    (row, column), (row_behind, column_behind) = cells[[best, other]].tolist()
-    return (row, column), (row_behind, column_behind)
+def _saddle(clear: Floats, narrow: float, here: Cell, there: Cell) -> tuple[Cell, Cell]:
+    """The first cell, as clear as is ``narrow``, of a way out of the room around ``here``, and one behind it.
+
+    Rooms are all that is clearer. The way has the fewest such cells and rooms.
+    """
+    nodes, rooms = ndimage.label(clear > narrow)
+    gates = np.argwhere(clear == narrow)
+    nodes[tuple(gates.T)] = rooms + 1 + np.arange(len(gates))
+    tails, heads = np.concatenate(
+        [
+            np.stack([one.ravel(), other.ravel()])
+            for one, other in ((nodes[:-1], nodes[1:]), (nodes[:, :-1], nodes[:, 1:]))
+        ],
+        axis=1,
+    )
+    joined = (tails != heads) & (np.minimum(tails, heads) > 0)
+    ends, size = (tails[joined], heads[joined]), rooms + 1 + len(gates)
+    graph = sparse.csr_array((np.ones(len(ends[0]), bool), ends), shape=(size, size))
+    _, before = csgraph.breadth_first_order(graph, nodes[here], directed=False)
+    way = [int(nodes[there])]
+    while way[-1] != nodes[here]:
+        way.append(int(before[way[-1]]))
+    way.reverse()
+    behind = next(k for k in range(2, len(way)) if way[k] <= rooms)
+    (row, column), (last_row, last_column) = gates[[way[1] - rooms - 1, way[behind - 1] - rooms - 1]].tolist()
+    beside = [(last_row + 1, last_column), (last_row - 1, last_column)]
+    beside += [(last_row, last_column + 1), (last_row, last_column - 1)]
+    bounds = clear.shape
+    inside = (each for each in beside if 0 <= each[0] < bounds[0] and 0 <= each[1] < bounds[1])
+    return (row, column), next(each for each in inside if nodes[each] == way[behind])
 
 
-def _with_corners(cells: Integers) -> Integers:
-    """Cells ``[n, 2]`` with one more beside each diagonal step, which leads over a corner of it."""
-    corners = np.stack([cells[1:, 0], cells[:-1, 1]], axis=1)
-    both = np.stack([cells[:-1], corners], axis=1).reshape(-1, 2)
-    whole: Integers = np.concatenate([both, cells[-1:]])
-    return whole
-
-
-def _roomiest(world: OccupancyMap, clear: Floats, place: Point) -> tuple[int, int]:
+def _roomiest(world: OccupancyMap, clear: Floats, place: Point) -> Cell:
     """The cell ``(row, column)`` uphill from a place, around which no cell is clearer."""
     rows, columns = clear.shape
     column, row = (int(each / world.resolution) for each in place)
@@ -117,11 +128,12 @@ def _roomiest(world: OccupancyMap, clear: Floats, place: Point) -> tuple[int, in
         best = low + int(up), left + int(right)
 
 
-def _joins(open_cells: Flags, here: tuple[int, int], there: tuple[int, int]) -> bool:
+def _joins(open_cells: Flags, here: Cell, there: Cell) -> bool:
     """Whether a way over cells leads from one to another."""
     rooms, _ = ndimage.label(open_cells)
     return bool(rooms[here] == rooms[there] != 0)
 
 
-def _middle(world: OccupancyMap, cell: tuple[int, int]) -> Floats:
-    return world.resolution * (np.array(cell[::-1]) + 0.5)
+def _middle(world: OccupancyMap, cell: Cell) -> Point:
+    row, column = cell
+    return world.resolution * (column + 0.5), world.resolution * (row + 0.5)

@@ -22,7 +22,7 @@ from planners.routes.legs import Leg, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead
 from planners.routes.stuck import Stuck
 from planners.search.braking import free_stop, is_free_drive
-from planners.search.outcome import Status
+from planners.search.outcome import MEANINGS, Status
 from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
@@ -92,7 +92,7 @@ class LegSearch:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
         place = float(nearest[0]), float(nearest[1])
         if self._is_enclosed:
-            why = "every drive out of the goal pose ends near it, so hardly any leads there"
+            why = MEANINGS[Status.GOAL_ENCLOSED]
             return Stuck(ahead.stop.place, why, tried, is_enclosed=True)
         if free_stop(start, self._vehicle, self._scene) is None:
             why = "the vehicle can neither stop in time nor drive on from its motion at the start"

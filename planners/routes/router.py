@@ -205,8 +205,7 @@ class Router:
 
     def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
         """Where the widest way is narrowest, if the vehicle hardly fits through there."""
-        gap = narrowest_gap(self._world, start, goal)
-        return gap if gap is not None and gap.width <= NARROW * self._widest else None
+        return narrowest_gap(self._world, start, goal, NARROW * self._widest)
 
 
 def _disc_inside(body: Vehicle | Trailer) -> float:

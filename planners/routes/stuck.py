@@ -30,8 +30,8 @@ class Stuck(NamedTuple):
         if self.gap is not None:
             where = _told_place(self.gap.place, world, scale)
             widths = [f"{scale * each:.2f} m" for each in (self.gap.width, self.width)]
-            line += f"; the widest way there narrows to {widths[0]} at most, at {where}"
-            line += f", and the vehicle is {widths[1]} wide"
+            line += f"; the widest way there narrows to at most {widths[0]} at {where}"
+            line += f", and the widest body has {widths[1]}"
         return line
 
     def fields(self, world: OccupancyMap, scale: float) -> dict[str, Any]:
@@ -41,6 +41,7 @@ class Stuck(NamedTuple):
             gap = {"place": _in_map(self.gap.place, world, scale), "width_m": scale * self.gap.width}
         return {
             "why": self.why,
+            "goal_is_enclosed": self.is_enclosed,
             "place": _in_map(self.place, world, scale),
             "to_go_m": None if self.to_go is None else scale * self.to_go,
             "gap": gap,
@@ -57,7 +58,7 @@ class Stuck(NamedTuple):
 def _told_place(point: Point, world: OccupancyMap, scale: float) -> str:
     """A place in metres of a map's own frame, of which ``scale`` are a canonical one."""
     x, y = _in_map(point, world, scale)
-    return f"({x:.1f}, {y:.1f})"
+    return f"({x:.2f}, {y:.2f})"
 
 
 def _in_map(point: Point, world: OccupancyMap, scale: float) -> Point:

@@ -14,7 +14,7 @@ from planners.search.braking import stopping
 from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.manoeuvres.squeezing import squeeze
 from planners.search.manoeuvres.suitability import suits
-from planners.search.outcome import Other, Outcome, Status
+from planners.search.outcome import Other, Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
 from planners.search.rrt import growing
@@ -194,6 +194,12 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             tree.counts[trees.CHECKS] += checks
         return squeezed is not None
 
+    def is_enclosed() -> bool:
+        """Whether squeezing was in vain, too, and no known ending may lead to the goal."""
+        if manoeuvring is None or may_squeeze or not (joining is None or joining.is_over):
+            return False
+        return manoeuvring.is_enclosed
+
     def halfway() -> float:
         return latest - KEPT_BACK * (latest - working_clock())
 
@@ -211,6 +217,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         grow,
         explore,
         explore_from=explore_from,
+        is_enclosed=is_enclosed,
     )
     if query.others and outcome.plan is not None and manoeuvring is not None and squeezed is None:
         began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
@@ -229,8 +236,6 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + working_clock() - began,
         )
-    if outcome.plan is None and manoeuvring is not None and manoeuvring.is_enclosed:
-        outcome = replace(outcome, status=Status.GOAL_ENCLOSED)
     outcome = replace(outcome, expected_s=expected_s)
     if joining is None:
         return outcome

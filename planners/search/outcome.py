@@ -25,7 +25,7 @@ class Status(StrEnum):
     START_BLOCKED = "start-blocked"
     GOAL_BLOCKED = "goal-blocked"
     INFEASIBLE = "infeasible"  # it is certain that no drive leads to the goal
-    GOAL_ENCLOSED = "goal-enclosed"  # all that was found out of the goal pose ends near it
+    GOAL_ENCLOSED = "goal-enclosed"  # every drive out of the goal pose that was found ends near it
 
 
 MEANINGS: Final = {
@@ -34,7 +34,7 @@ MEANINGS: Final = {
     Status.START_BLOCKED: "at the start the vehicle meets an obstacle or the bounds",
     Status.GOAL_BLOCKED: "no place in the goal is free",
     Status.INFEASIBLE: "it is certain that no drive leads there",
-    Status.GOAL_ENCLOSED: "out of the goal pose every drive ends near it, so hardly any leads there",
+    Status.GOAL_ENCLOSED: "every drive out of the goal pose that was found ends near it",
 }  # of an attempt without a plan, for people
 
 

@@ -46,6 +46,7 @@ def attempt(
     explore: Grow | None = None,
     follow_guide: Grow | None = None,
     explore_from: int = 1,
+    is_enclosed: Callable[[], bool] = lambda: False,
 ) -> Outcome:
     """Grow a tree until the problem is solved or a limit is reached.
 
@@ -65,6 +66,7 @@ def attempt(
         explore: grows the tree of every second trial; nothing is prepared for it.
         follow_guide: grows the first tree for ``GUIDED`` expansions, after which it is mostly solved.
         explore_from: the first trial that explores.
+        is_enclosed: whether nothing leads away from the goal, so that the search ends.
     """
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
     began = working_clock()
@@ -112,6 +114,8 @@ def attempt(
                 found = query.beside(work_of(int(counts[trees.CHECKS]), int(counts[trees.EXPANSIONS])))
             if counts[trees.GOAL_VERTEX] >= 0 or found is not None:
                 status = Status.SOLVED
+            elif is_enclosed():
+                status = Status.GOAL_ENCLOSED
             elif working_clock() - began > limits.seconds:
                 status = Status.TIME_SPENT
     if status is Status.SOLVED and found is None:

@@ -52,7 +52,7 @@ class _Told(_Listener):
     def __init__(self, is_kernel: Predicate) -> None:
         super().__init__(is_kernel)
         self._depth = 0  # kernels that wait for those that they call
-        self.seconds = 0.0  # of kernels that are done
+        self._done_s = 0.0  # of kernels that are done
         self._began = 0.0
         self._lines = 0  # that were logged
 
@@ -66,12 +66,17 @@ class _Told(_Listener):
     def on_end(self, event: event.Event) -> None:
         if self._is_kernel(event):
             self._tell()
+            if self._depth == 1:
+                self._done_s = self.seconds
             self._depth -= 1
-            if self._depth == 0:
-                self.seconds += time.monotonic() - self._began
+
+    @property
+    def seconds(self) -> float:
+        """How long kernels were compiled so far."""
+        return self._done_s + (time.monotonic() - self._began if self._depth > 0 else 0.0)
 
     def _tell(self) -> None:
-        seconds = self.seconds + time.monotonic() - self._began
+        seconds = self.seconds
         if self._lines == 0 and seconds >= TOLD_AFTER:
             self._lines = 1
             _LOG.info(

@@ -133,6 +133,14 @@ class RunFolder:
         return files_in(self.table(table, class_name), "[0-9]*.parquet")
 
 
+def worlds_name(path: Path) -> str:
+    """The class of worlds or of a map: the folder's name, or the file's without its ending.
+
+    It has ``-`` for points, as in ``floor-v1.2.yaml``.
+    """
+    return (path.name if path.is_dir() else path.stem).replace(".", "-")
+
+
 def checked_name(name: str) -> str:
     """The name of a class or run. Raises StorageError if it cannot be a file's name everywhere."""
     if not NAME.fullmatch(name):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from storage.errors import StorageError, sentence
-from storage.places.run_folder import checked_name
+from storage.places.run_folder import checked_name, worlds_name
 from storage.worlds.moving_ai import map_of_scenarios
 from storage.worlds.numpy_grids import is_stack
 from storage.worlds.picture_files import size_of
@@ -84,11 +84,8 @@ class Source:
 
 
 def class_of(path: Path) -> str:
-    """The class that worlds at a ``path`` are named after, with ``-`` for points as in ``floor-v1.2.yaml``.
-
-    Raises StorageError if it cannot name one.
-    """
-    return checked_name((path.name if path.is_dir() else path.stem).replace(".", "-"))
+    """The class that worlds at a ``path`` are named after. Raises StorageError if it cannot name one."""
+    return checked_name(worlds_name(path))
 
 
 def source_at(path: Path, named: str | None = None) -> Source:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from planners.attempt import Attempt
 from planners.memory.memory import Memory
@@ -23,6 +23,7 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.settings.run_settings import Assist, RunSettings
 
+TURNS_A_COLLECTION: Final = 16  # of garbage, which takes as long as thirty attempts
 MemoryOfRun = tuple[str, str]  # name of a memory, and the run that made it
 Made = TypeVar("Made")
 
@@ -62,7 +63,8 @@ def in_turn(
                 way = int(turns[number][turn])
                 other_work()
                 made[number, way] = attempt(problem, way)
-            gc.collect()
+            if turn % TURNS_A_COLLECTION == 0:
+                gc.collect()
     return made
 
 

@@ -187,7 +187,7 @@ def _refusal(
     other = "motion at the start, --seed, heading" if moves else "--seed, heading"
     advice = "it does not fit through" if stuck.is_too_narrow else f"try another {other} or planner"
     if stuck.is_enclosed:
-        advice = "choose another place or heading"
+        advice = "make room around it, or choose another place or heading"
     tried = f"{stuck.attempts} local problem{'s' * (stuck.attempts != 1)} tried"
     return RunError(f"{line} ({tried}); {advice}.")
 

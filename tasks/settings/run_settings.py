@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 from planners.world.vehicles.vehicle import name_of
+from storage.places.run_folder import worlds_name
 from storage.tables.earlier_versions import RENAMED
 from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.encoder_training import Learning
@@ -235,6 +236,5 @@ def _renamed(assist: Assist, names: dict[str, str]) -> Assist:
 
 
 def world_class(path: str | Path) -> str:
-    """The class name of worlds or of a map: the folder's name, or the file's without its ending."""
-    path = Path(path).resolve()
-    return path.name if path.is_dir() else path.stem
+    """The class of worlds or of a map (``worlds_name``), wherever the path leads."""
+    return worlds_name(Path(path).resolve())

@@ -45,9 +45,9 @@ from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, window_of
-from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
+from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS, SLACK
 from planners.world.problem import Plan, start_state
-from planners.world.vehicles.vehicle import state_size
+from planners.world.vehicles.vehicle import state_size, trailers_of
 
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
@@ -58,6 +58,7 @@ PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes 
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
 SLICE: Final = 64  # expansions between two looks at the clock
+EXACT: Final = 0.1  # of a length, or radians: whoever may stand farther off may get where the pose does not
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
@@ -92,6 +93,11 @@ class Manoeuvring:
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
         ends = np.abs([start[0, 5:], pose_of(goal, size)[5:]]).max(0)
+        self._is_exact = (
+            goal[RADIUS] <= EXACT * (vehicle.front + vehicle.rear)
+            and goal[HEADING_TOLERANCE] <= EXACT
+            and len(goal) == HITCHES + 2 * len(trailers_of(vehicle))
+        )
         self._leaving = less_folded(vehicle, ends)
         self._outgoing = time_reversed(self._leaving)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
@@ -160,13 +166,19 @@ class Manoeuvring:
 
     @property
     def is_enclosed(self) -> bool:
-        """Whether all drives out of the goal ended near it, however fine, before any reached the bounds."""
+        """Whether all drives out of the goal end near it, with nothing left to open at any level.
+
+        Where a body came within the vehicle's length of the bounds, there may be a way beyond them, and where
+        large tolerances are asked for, or no hitch angles, out of a pose beside this one.
+        """
         size = int(self._tree.counts[SIZE])
-        if not self.is_over or self.kept or size == NODES:
+        if not self.is_over or self.kept or size == NODES or not self._is_exact:
             return False
         places, bounds = self._tree.states[:size, :2], np.array(self._query.problem.bounds)
         room = np.minimum(places.min(0) - bounds[:2], bounds[2:] - places.max(0)).min()
-        return bool(room > self._vehicle.front + self._vehicle.rear)
+        trailers = trailers_of(self._vehicle)
+        behind = self._vehicle.rear + sum(each.hitch_length + each.rear for each in trailers)
+        return bool(room > self._vehicle.front + behind)
 
     @property
     def is_stuck(self) -> bool:

@@ -55,18 +55,19 @@ def counting_time(vehicle: Vehicle) -> Vehicle:
 
 
 def slowed(vehicle: Vehicle, speed: float) -> Vehicle:
-    """The vehicle as if it were slower wherever seconds count more: then its time is what drives cost.
+    """The vehicle as if it were slower wherever seconds count more: then its time is in proportion to costs.
 
-    One that has this ``speed`` (m/s) at the start and could not be slower is returned as it is.
+    One that would not be slower, or could not with this ``speed`` (m/s) at the start, is returned as it is.
     """
     costs = vehicle.costs
     least = min(costs.forwards, costs.backwards)
     slow = vehicle._replace(
         min_speed=vehicle.min_speed * (least / costs.backwards),
         max_speed=vehicle.max_speed * (least / costs.forwards),
-        costs=Costs(gear_change=costs.gear_change),
+        costs=Costs(gear_change=costs.gear_change / least),
     )
-    return slow if vehicle.min_speed < 0.0 and slow.min_speed <= speed <= slow.max_speed else vehicle
+    is_slower = vehicle.min_speed < 0.0 and costs.forwards != costs.backwards
+    return slow if is_slower and slow.min_speed <= speed <= slow.max_speed else vehicle
 
 
 def slimmer(vehicle: Vehicle, share: float) -> Vehicle:

@@ -84,7 +84,7 @@ def test_it_is_told_in_metres_of_the_map() -> None:
     assert stuck.to_go is not None
     assert stuck.gap is not None
     for x, y in (stuck.place, stuck.gap.place):
-        assert f"({100.0 + 4.0 * x:.1f}, {4.0 * y:.1f})" in told
+        assert f"({100.0 + 4.0 * x:.2f}, {4.0 * y:.2f})" in told
     for metres in (f"{4.0 * stuck.to_go:.0f}", f"{4.0 * stuck.gap.width:.2f}", f"{4.0 * CAR.width:.2f}"):
         assert f" {metres} m" in told
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from dashboards.web.data_reader import class_names
 from planners.maps.occupancy_map import Cells, OccupancyMap
 from storage.errors import StorageError
 from storage.worlds.importing import ImportSettings, import_part, load_map
 from storage.worlds.moving_ai import read_scenarios
 from storage.worlds.sources import source_at
+from tasks.settings.run_settings import world_class
 from tests.storage.worlds.samples import town_cells, write_map, write_ros, write_scenarios
 
 CELLS = town_cells()
@@ -136,4 +138,6 @@ def test_scenarios_find_their_map_beside_them(tmp_path: Path) -> None:
 
 def test_a_name_may_have_points(tmp_path: Path) -> None:
     write_map(tmp_path / "floor-v1.2.map", town_cells())
-    assert source_at(tmp_path / "floor-v1.2.map").class_name == "floor-v1-2"
+    named = source_at(tmp_path / "floor-v1.2.map").class_name
+    assert named == world_class(tmp_path / "floor-v1.2.map") == "floor-v1-2"
+    assert class_names({"classes": [], "worlds": [str(tmp_path / "floor-v1.2.map")]}) == [named]
