@@ -35,6 +35,7 @@ _CROSS: Final[dict[str, Any]] = {
 _GAP: Final[dict[str, Any]] = {
     "marker": "D", "color": "none", "markeredgecolor": VERMILLION, "markeredgewidth": 1.6, "linestyle": "none"
 }  # fmt: skip
+_STANDING: Final = 1.5  # of a vehicle that stands there, to each side of the cross
 _BEYOND: Final = "#e6e6e6"  # the map: nobody may drive there
 
 
@@ -79,7 +80,7 @@ def stuck_picture(
                 [],
                 **_CROSS,
                 markersize=9,
-                label="nobody gets out of here" if stuck.is_enclosed else "stuck here",
+                label="no way out was found" if stuck.is_enclosed else "stuck here",
             )
         )
         if stuck.gap is not None:
@@ -89,7 +90,8 @@ def stuck_picture(
                 each.plot(right, up, **_GAP, markersize=9, zorder=11)
             handles.append(Line2D([], [], **_GAP, markersize=8, label="narrowest place of the widest way"))
         standing = _standing_at(stuck.place, start, stops, vehicle)
-        reach = CLOSE_UP_LENGTHS * scale * whole_length_m(vehicle if standing is None else standing[1])
+        lengths, shown_as = (CLOSE_UP_LENGTHS, vehicle) if standing is None else (_STANDING, standing[1])
+        reach = lengths * scale * whole_length_m(shown_as)
         draw_map(close_up, world, OCCUPIED)
         close_up.set_xlim(x - reach, x + reach)
         close_up.set_ylim(y - reach, y + reach)
