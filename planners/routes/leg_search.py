@@ -54,7 +54,7 @@ class LegSearch:
         Args:
             surroundings: what is occupied on the map.
             scene: the same, ready for collision checks.
-            solve: solves local problems, from any motion to a place.
+            solve: solves local problems, from any motion to a place or a pose.
             vehicle: what is to be driven.
             name: of the map.
         """

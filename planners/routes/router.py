@@ -60,7 +60,7 @@ class Router:
 
         Args:
             world: the map.
-            solve: solves local problems, from any motion to a place.
+            solve: solves local problems, from any motion to a place or a pose.
             vehicle: what is to be driven.
             tolerance_m: how far the outlines of occupied regions may move.
             polishes: whether the drive to each stop is polished as a whole.

@@ -33,7 +33,7 @@ def faster(plan: Plan, column: int, by: float) -> Plan:
 
 
 def test_plans_of_every_planner_and_assist_pass() -> None:
-    checked = [(source, wrong_with(problem, plan)) for problem, source, plan in islice(car_plans(94), 150)]
+    checked = [(source, wrong_with(problem, plan)) for problem, source, plan in islice(car_plans(94), 90)]
     assert {"searched", "repaired"} <= {source for source, _ in checked}
     assert not [wrong for _, wrong in checked if wrong]
 
