@@ -27,7 +27,7 @@ test-slow: $(READY) prepared  ## the tests that take minutes
 	$(BIN)/pytest -m slow -q --timeout 3600
 
 test-cluster: $(READY) prepared  ## more than one machine, all of them here: needs the PostgreSQL server
-	$(BIN)/pytest -m cluster -q
+	$(BIN)/pytest -m cluster -q tests/cluster
 
 wheel: $(READY) prepared  ## build sdist and wheel, install it alone in a new environment, and plan with it
 	$(BIN)/python -m tests.wheel

@@ -17,7 +17,7 @@ np.seterr(all="raise", under="ignore")
 compiling.TOLD_AFTER = math.inf  # or which test's error stream told of compiling would be left to chance
 # no times: compiling a kernel takes seconds, and the machine may be busy
 _STRICT = settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("strict", _STRICT, max_examples=25)
+settings.register_profile("strict", _STRICT, max_examples=16)
 settings.register_profile("thorough", _STRICT, max_examples=500)  # HYPOTHESIS_PROFILE=thorough make test
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "strict"))
 

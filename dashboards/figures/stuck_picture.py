@@ -74,15 +74,8 @@ def stuck_picture(
     handles = draw_ends(axes, world, start, stops, scale, view.longest)
     for close_up in close_ups:
         axes.plot(x, y, **_CROSS, markersize=11, zorder=12)
-        handles.append(
-            Line2D(
-                [],
-                [],
-                **_CROSS,
-                markersize=9,
-                label="no way out was found" if stuck.is_enclosed else "stuck here",
-            )
-        )
+        told = "no way out was found" if stuck.is_enclosed else "stuck here"
+        handles.append(Line2D([], [], **_CROSS, markersize=9, label=told))
         if stuck.gap is not None:
             right, up = stuck.gap.place
             right, up, _ = world.pose(scale * right, scale * up, 0.0)
