@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.special import betaincinv
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Integers
 
 RESAMPLES: Final = 2000  # the ends of a 95 % interval then stand on 50 resamples each
 CONFIDENCE: Final = 0.95
@@ -48,29 +45,31 @@ def bootstrap(
     sums = np.empty((summands.shape[0], resamples))
     middle = np.empty((values.shape[1], resamples if interquartile else 0))
     first = 0
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for counts in _resamples(len(values), seed, resamples):
-            here = slice(first, first + counts.shape[1])
-            sums[:, here] = summands @ counts
-            if interquartile:
-                means = threads.map(partial(resampled_interquartile_mean, counts=counts), values.T)
-                for mine, of_column in zip(middle, means, strict=True):
-                    mine[here] = of_column
-            first = here.stop
+    orders = [_order(column) for column in values.T] if interquartile else []
+    for counts in _resamples(len(values), seed, resamples):
+        here = slice(first, first + counts.shape[1])
+        sums[:, here] = summands @ counts
+        for k, order in enumerate(orders):
+            middle[k, here] = resampled_interquartile_mean(values[order, k], counts[order])
+        first = here.stop
     total, attempted, mine, without = np.split(sums.T, 4, axis=1)
     return Resampled(ratio(total, attempted), 1.0 - ratio(mine, without), middle.T)
 
 
-def resampled_interquartile_mean(values: Floats, counts: Floats) -> Floats:
-    """Means ``[R]`` of the middle half of ``values [n]``, each there ``counts [n, R]`` times in a resample.
-
-    A value at the cut of a quarter counts in part. NaN values are left out.
-    """
+def _order(values: Floats) -> Integers:
+    """The order of ``values [n]``, the smallest first, without those that are NaN."""
     order = np.argsort(values)[: int(np.count_nonzero(~np.isnan(values)))]
-    if not len(order):
+    return order.astype(np.int32)
+
+
+def resampled_interquartile_mean(ranked: Floats, counts: Floats) -> Floats:
+    """Means ``[R]`` of the middle half of n numbers, each there ``counts [n, R]`` times in a resample.
+
+    They are ``ranked``, the smallest first. One at the cut of a quarter counts in part.
+    """
+    if not len(ranked):
         return np.full(counts.shape[1], np.nan)
-    ranked = values[order]
-    below = np.cumsum(counts[order], axis=0)
+    below = np.cumsum(counts, axis=0)
     total = below[-1].copy()
     np.minimum(np.maximum(below, 0.25 * total, out=below), 0.75 * total, out=below)
     # Each value times its weight, the step of ``below`` at it; summed by parts, one pass does.
@@ -80,7 +79,8 @@ def resampled_interquartile_mean(values: Floats, counts: Floats) -> Floats:
 
 def interquartile_mean(values: Floats) -> float:
     """Mean of the middle half of ``values [n]``: neither the fastest nor the slowest quarter moves it."""
-    return float(resampled_interquartile_mean(values, np.ones((len(values), 1)))[0])
+    order = _order(values)
+    return float(resampled_interquartile_mean(values[order], np.ones((len(order), 1)))[0])
 
 
 def interval(resampled: Floats) -> tuple[Floats, Floats]:
