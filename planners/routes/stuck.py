@@ -35,7 +35,7 @@ class Stuck(NamedTuple):
         return line
 
     def fields(self, world: OccupancyMap, scale: float) -> dict[str, Any]:
-        """The same for programs, as JSON values."""
+        """Where and why a route is stuck, for programs; metres are those that ``told`` tells."""
         gap = None
         if self.gap is not None:
             gap = {"place": _in_map(self.gap.place, world, scale), "width_m": scale * self.gap.width}

@@ -184,10 +184,12 @@ def _refusal(
     line = f"No route across {source.path.name}: {stuck.told(world, scale)}"
     if stuck.attempts == 0:
         return UsageError(f"{line}." if stuck.is_too_narrow else f"{line}; choose another place or heading.")
-    other = "motion at the start, --seed, heading" if moves else "--seed, heading"
-    advice = "it does not fit through" if stuck.is_too_narrow else f"try another {other} or planner"
     if stuck.is_enclosed:
         advice = "make room around it, or choose another place or heading"
+    elif stuck.is_too_narrow:
+        advice = "it does not fit through"
+    else:
+        advice = f"try another {'motion at the start, ' * moves}--seed, heading or planner"
     tried = f"{stuck.attempts} local problem{'s' * (stuck.attempts != 1)} tried"
     return RunError(f"{line} ({tried}); {advice}.")
 

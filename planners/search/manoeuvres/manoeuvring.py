@@ -11,21 +11,14 @@ import numpy as np
 from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
+from planners.search.manoeuvres.enclosure import is_closed
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.levels import FINE, LEVELS, suited
 from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
 from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
-from planners.search.manoeuvres.pose_tree import (
-    CHECKS,
-    NODES,
-    SIZE,
-    PoseTree,
-    allocate_pose_tree,
-    plant_root,
-    pose_of,
-)
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
 from planners.search.manoeuvres.variants import (
@@ -45,9 +38,9 @@ from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, window_of
-from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS, SLACK
+from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
-from planners.world.vehicles.vehicle import state_size, trailers_of
+from planners.world.vehicles.vehicle import state_size
 
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
@@ -58,7 +51,6 @@ PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes 
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
 SLICE: Final = 64  # expansions between two looks at the clock
-EXACT: Final = 0.1  # of a length, or radians: whoever may stand farther off may get where the pose does not
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
@@ -93,11 +85,6 @@ class Manoeuvring:
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
         ends = np.abs([start[0, 5:], pose_of(goal, size)[5:]]).max(0)
-        self._is_exact = (
-            goal[RADIUS] <= EXACT * (vehicle.front + vehicle.rear)
-            and goal[HEADING_TOLERANCE] <= EXACT
-            and len(goal) == HITCHES + 2 * len(trailers_of(vehicle))
-        )
         self._leaving = less_folded(vehicle, ends)
         self._outgoing = time_reversed(self._leaving)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
@@ -166,19 +153,10 @@ class Manoeuvring:
 
     @property
     def is_enclosed(self) -> bool:
-        """Whether all drives out of the goal end near it, with nothing left to open at any level.
-
-        Where a body came within the vehicle's length of the bounds, there may be a way beyond them, and where
-        large tolerances are asked for, or no hitch angles, out of a pose beside this one.
-        """
-        size = int(self._tree.counts[SIZE])
-        if not self.is_over or self.kept or size == NODES or not self._is_exact:
+        """Whether all drives out of the goal end near it, with nothing left to open at any level."""
+        if not self.is_over or self.kept:
             return False
-        places, bounds = self._tree.states[:size, :2], np.array(self._query.problem.bounds)
-        room = np.minimum(places.min(0) - bounds[:2], bounds[2:] - places.max(0)).min()
-        trailers = trailers_of(self._vehicle)
-        behind = self._vehicle.rear + sum(each.hitch_length + each.rear for each in trailers)
-        return bool(room > self._vehicle.front + behind)
+        return is_closed(self._tree, self._goal, self._query.problem.bounds, self._vehicle)
 
     @property
     def is_stuck(self) -> bool:
