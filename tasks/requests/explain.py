@@ -14,7 +14,7 @@ from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.sub_plan_answers import SubPlanAnswer
-from planners.world.problem import Plan
+from planners.world.problem import Plan, Problem
 
 USES: Final = {
     "answer": "the answer",
@@ -36,7 +36,7 @@ def log_explanation(
     attempt: Attempt,
     memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
-    scale: float,
+    problem: Problem,
     parts: SubPlanAnswer | None,
     drive: DriveAnswer | None = None,
 ) -> None:
@@ -46,13 +46,13 @@ def log_explanation(
         attempt: the attempt to explain.
         memory: the memory or library that was used, or None.
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
-        scale: how many metres of the problem are one canonical metre.
+        problem: what was asked; places are told in its own metres.
         parts: what parts of plans had for the problem; None if whole plans are to answer it.
         drive: the whole drive of a library that was moved to the problem; None if none was.
     """
     _LOG.info(_recall_line(attempt, memory, recalled, parts, drive))
     if recalled:
-        _LOG.info(_table(recalled, scale))
+        _LOG.info(_table(recalled, problem))
     work = f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions"
     _LOG.info("work     %s, %s nodes", work, f"{attempt.nodes:,}")
     _LOG.info("ms       %s", _times(attempt))
@@ -115,13 +115,13 @@ def _told_of(parts: SubPlanAnswer, attempt: Attempt, plans: str) -> str:
     return f"parts of {plans} {found}"
 
 
-def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellTable:
+def _table(recalled: Sequence[tuple[Recollection, Plan]], problem: Problem) -> CellTable:
     rows = []
     for position, (recollection, plan) in enumerate(recalled, start=1):
         first, blocked = recollection.first_blocked, int(recollection.blocked.sum())
-        x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
+        x, y = (0.0, 0.0) if first is None else problem.scale * plan.states[first, :2] + problem.offset
         missed_m = recollection.goal_missed_m
-        missed = f"ends {scale * missed_m:.1f} m off the goal" if missed_m > 1e-9 else ""
+        missed = f"ends {problem.scale * missed_m:.1f} m off the goal" if missed_m > 1e-9 else ""
         cells = [
             f"{position}",
             f"{recollection.plan}",

@@ -116,7 +116,7 @@ def _explain(
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
     listed = list(zip(recollected, recalled, strict=True))
-    log_explanation(attempt, memory, listed, problem.scale, parts, drive and drive.answer)
+    log_explanation(attempt, memory, listed, problem, parts, drive and drive.answer)
     if memory is not None:
         with no_garbage_collection():
             log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -94,6 +95,27 @@ def test_the_command_tells_and_draws_it(
     assert marked.read_bytes() != plain.read_bytes()
     assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
     assert "no memory" in capsys.readouterr().out
+
+
+def test_places_of_collisions_are_told_in_the_metres_of_a_problem_far_from_the_origin(
+    memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_memory(tmp_path / "memory", memory)
+    write_problems(tmp_path / "near.json", [WALL])
+    asked = json.loads((tmp_path / "near.json").read_text())
+    east = 5_000.0
+    asked["start"][0] += east
+    asked["goal"][0] += east
+    asked["bounds"] = [low + (east if axis % 2 == 0 else 0.0) for axis, low in enumerate(asked["bounds"])]
+    asked["obstacles"] = [[[x + east, y] for x, y in polygon] for polygon in asked["obstacles"]]
+    (tmp_path / "far.json").write_text(json.dumps(asked))
+    places = []
+    for name in ("near", "far"):
+        plan_it = ["plan", str(tmp_path / f"{name}.json"), "--memory", str(tmp_path / "memory")]
+        assert call([*plan_it, "--explain", "--json"]) == 0
+        (table,) = json.loads(capsys.readouterr().out)["tables"]
+        places.append([tuple(row["first_blocked_m"].values()) for row in table["rows"]])
+    np.testing.assert_allclose(places[1], np.array(places[0]) + (east, 0.0), atol=0.01)
 
 
 def test_what_a_memory_is_worth_is_told_of_two_plans_that_were_improved_alike(
