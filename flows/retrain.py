@@ -28,6 +28,7 @@ def retrain(
     scheduler: str | None = None,
 ) -> None:
     """Make memories from what was learned since the champions, judge them, and promote the better ones."""
+    settings = settings.for_retraining()
     with locked_folder(data) as folder, cluster(workers, scheduler):
         registry = Registry(folder)
         for run in runs_to_make(folder, settings, registry):

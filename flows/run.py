@@ -14,6 +14,7 @@ from flows.train import train
 from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.fan_out import cluster
 from tasks.session.folder_lock import locks_data_folder
+from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.artifacts import publish_pages
 from tasks.tracking.logbook import run_logged
@@ -24,6 +25,7 @@ from tasks.tracking.report_log import pages_of
 @locks_data_folder
 def run(settings: RunSettings, data: str) -> None:
     """Do every stage, then the same with fewer experiences if the settings ask for it, and report."""
+    runs_of_continual(settings)  # is refused now, rather than after hours, if there are too few experiences
     with cluster(), run_logged(data, settings):
         collect(settings, data)
         hallucinate(settings, data)

@@ -110,10 +110,5 @@ def _write_champions(changed: Iterable[tuple[str, object, object]], what: str) -
 
 
 def _settings(options: Options) -> RunSettings:
-    from tasks.settings.errors import UsageError
-
-    if options.learned is not None:
-        raise UsageError(
-            "--learned cannot be used for retraining, which takes a snapshot of its own; leave it out."
-        )
-    return replace(settings_of(options), continual="none")
+    settings = settings_of(replace(options, learned=None))  # a snapshot is refused, whether there or not
+    return replace(settings, learned=options.learned or "").for_retraining()

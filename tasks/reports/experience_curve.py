@@ -14,6 +14,7 @@ from dashboards.report.tables import experience_table
 from dashboards.statistics.experience_recall import experience_rows
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import run_folder
+from tasks.inputs.shortfalls import as_collected
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.measure_recall import MEASURE_RECALL
@@ -39,7 +40,7 @@ def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
 def _rows(data: str, run: RunSettings) -> pd.DataFrame:
     shards = [
         chunk.shard("recalls")
-        for chunk in MEASURE_RECALL.chunks(data, run)
+        for chunk in MEASURE_RECALL.chunks(data, as_collected(data, run))
         if chunk.index > 0 and chunk.class_name != COMBINED  # runs with fewer experiences have none
     ]
     return experience_rows(read_recalls(shards))

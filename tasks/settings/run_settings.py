@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+from planners.memory.encoder.training import TrainingSettings
 from planners.world.vehicles.vehicle import name_of
 from storage.places.run_folder import worlds_name
 from storage.tables.earlier_versions import RENAMED
 from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.encoder_training import Learning
+from tasks.settings.errors import UsageError
 from tasks.settings.retraining_settings import Retraining
 
 Objective = Literal["labels", "triplet"]
@@ -163,6 +165,23 @@ class RunSettings:
     def grown(self) -> bool:
         """Whether memories have more plans than their encoders were taught (``planners.memory.growth``)."""
         return self.experiences > self.taught
+
+    def training(self, learning: Learning, seed: int) -> TrainingSettings:
+        """All settings of training one encoder of the run, with a way of ``learning`` and a seed."""
+        settings = learning.settings(self.objective, self.epochs, seed)
+        # with very many plans, the readout alone picks candidates, so it has to know what the cells say
+        return replace(settings, by_cells=not self.grown)
+
+    def for_retraining(self) -> RunSettings:
+        """These settings without being measured with fewer experiences.
+
+        Raises UsageError if they name a snapshot of what was learned.
+        """
+        if self.learned:
+            raise UsageError(
+                "--learned cannot be used for retraining, which takes a snapshot of its own; leave it out."
+            )
+        return replace(self, continual="none")
 
     @property
     def vehicle_name(self) -> str:

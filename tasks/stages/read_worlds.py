@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from planners.world.alignment import to_canonical
-from planners.world.problem import Problem
+from planners.world.problem import Problem, is_canonical
 from storage.tables.imported_problems import write_imported
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Part, source_at
@@ -22,6 +22,9 @@ from tasks.settings.run_settings import world_class
 
 # problems to collect from for each wanted solved problem, because some are not solved
 CUT_FROM_MAP: Final = 2
+OTHER_QUESTION: Final = (
+    "does not lead from rest to a place 50√2 m straight ahead (times the scale), which is what a run collects"
+)
 
 _LOG = logging.getLogger(__name__)
 
@@ -36,7 +39,8 @@ class WorldsRead(NamedTuple):
 def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
     """Read the worlds of a class, or cut its map into problems.
 
-    If a part has no usable problem, the class has none. Raises RunError in that case if settings are strict.
+    If a part has no usable problem, the class has none. Raises RunError in that case if settings are strict,
+    or if a problem asks another question than runs collect.
     """
     settings, run = chunk.settings, chunk.run
     source = source_at(next(Path(path) for path in settings.worlds if world_class(path) == chunk.class_name))
@@ -50,11 +54,19 @@ def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
         imported = import_part(
             source, part, ImportSettings(*whole, count, settings.seed, chunk.vehicle.scale)
         )
-        if not imported.problems:
+        problems[part] = []
+        for problem in imported.problems:
+            fit = replace(to_canonical(problem)[0], class_name=chunk.class_name)
+            if is_canonical(fit):
+                problems[part].append(fit)
+            elif settings.strict:
+                raise RunError(f"{source.path}: problem {problem.id} {OTHER_QUESTION}.")
+            else:
+                imported.skipped.append((f"{source.path} problem {problem.id}", OTHER_QUESTION))
+        if not problems[part]:
             unusable = f"{source.path} holds no usable problem for part {part} ({imported.explained()})."
             if settings.strict:
                 raise RunError(unusable)
-        problems[part] = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
         skipped += imported.skipped
     for part in PARTS.values():
         write_imported(run.worlds(chunk.class_name, part), [] if unusable else problems[part])
@@ -67,7 +79,7 @@ READ_WORLDS: Final = Stage(
     do=read_worlds_chunk,
     result=WorldsRead,
     classes=lambda settings: [world_class(path) for path in settings.worlds],
-    cut=lambda _, settings, name: Cut(1, 1, source_key(settings, name)),
+    cut=lambda _, settings, name: Cut(1, 1, [*source_key(settings, name), settings.strict]),
     output=lambda chunk: chunk.run.worlds_folder(chunk.class_name),
     is_whole=is_marked,
 )

@@ -46,7 +46,7 @@ def sweep_chunk(chunk: Chunk) -> None:
     settings = chunk.settings
     problems = problems_of_memory(chunk.data, settings, chunk.class_name)
     learning = variants(settings)[chunk.index]
-    training = learning.settings(settings.objective, settings.epochs, settings.seed)
+    training = settings.training(learning, settings.seed)
     masks = taught_masks(chunk.run, settings, chunk.class_name)
     trained = train(problems.grids, problems.plan_index, problems.free, masks, training)
     best = max(trained.history, key=lambda epoch: epoch.hit_1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -35,11 +35,7 @@ def train_chunk(chunk: Chunk) -> Trained:
     """
     run_settings = chunk.settings
     problems = problems_of_memory(chunk.data, run_settings, chunk.class_name)
-    settings = run_settings.learning.settings(
-        run_settings.objective, run_settings.epochs, run_settings.seed + chunk.index
-    )
-    # with very many plans, the readout alone picks candidates, so it has to know what the cells say
-    settings = replace(settings, by_cells=not run_settings.grown)
+    settings = run_settings.training(run_settings.learning, run_settings.seed + chunk.index)
     path = _checkpoint(chunk)
 
     def on_epoch(checkpoint: Checkpoint) -> None:

@@ -115,7 +115,7 @@ def test_places_of_collisions_are_told_in_the_metres_of_a_problem_far_from_the_o
         assert call([*plan_it, "--explain", "--json"]) == 0
         (table,) = json.loads(capsys.readouterr().out)["tables"]
         places.append([tuple(row["first_blocked_m"].values()) for row in table["rows"]])
-    np.testing.assert_allclose(places[1], np.array(places[0]) + (east, 0.0), atol=0.01)
+    np.testing.assert_allclose(places[1], np.add(places[0], (east, 0.0)), atol=0.01)
 
 
 def test_what_a_memory_is_worth_is_told_of_two_plans_that_were_improved_alike(

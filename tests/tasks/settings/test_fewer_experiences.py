@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from flows.run import run
 from tasks.settings.errors import UsageError
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.presets import for_preset
@@ -39,3 +41,17 @@ def test_too_few_experiences_are_refused_in_one_line() -> None:
 
 def test_what_is_measured_beside_a_run_does_not_change_its_name() -> None:
     assert for_preset("paper", continual="all").run_name == for_preset("paper").run_name
+
+
+def test_a_run_with_too_few_is_refused_before_it_begins(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"4 experiences: give 5 or more"):
+        run.fn(for_preset("smoke", experiences=4, continual="all"), str(tmp_path))
+    assert not list(tmp_path.rglob("*.parquet"))
+
+
+@pytest.mark.parametrize("continual", ["all", "paper", "none"])
+def test_a_retraining_is_not_measured_with_fewer_and_takes_its_own_snapshot(continual: str) -> None:
+    settings = for_preset("smoke", experiences=4, continual=continual)
+    assert settings.for_retraining() == for_preset("smoke", experiences=4, continual="none")
+    with pytest.raises(UsageError, match="--learned cannot be used"):
+        replace(settings, learned="monday").for_retraining()

@@ -10,6 +10,7 @@ import pytest
 from planners.optimisation.polish import polish
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
+from planners.world.problem import Arrival
 from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
 from storage.exchange.problems import write_problems
@@ -24,7 +25,7 @@ from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.collect import VARIANTS
 from tasks.stages.hallucinate import HALLUCINATE
-from tasks.stages.read_worlds import READ_WORLDS
+from tasks.stages.read_worlds import OTHER_QUESTION, READ_WORLDS
 from tasks.stages.relabel import RELABEL, problems_of_memory
 from tests.tasks.in_process import collect, run_stage
 
@@ -134,6 +135,26 @@ def test_strict_settings_stop_at_a_class_with_too_few(uneven: RunSettings, tmp_p
     strict = replace(uneven, strict=True)
     with pytest.raises(RunError, match=r"Class few has only 5 of 6 .* Ask for fewer"):
         collect(str(tmp_path / "data"), strict)
+
+
+def test_worlds_that_ask_another_question_are_skipped_or_refused_if_strict(
+    tmp_path: Path, plain: list
+) -> None:
+    own, pose = (
+        replace(plain[0].problem, id="own"),
+        replace(plain[1].problem, id="pose", arrival=Arrival(0.8, 0.1)),
+    )
+    for part in ("train", "test"):
+        write_problems(tmp_path / "mixed" / part / "problems.parquet", [own, pose])
+    settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "mixed"),))
+    data = str(tmp_path / "data")
+    (result,) = run_stage(READ_WORLDS, data, settings).values()
+    assert [reason == OTHER_QUESTION for _, reason in result.skipped] == [True, True]
+    assert result.unusable is None
+    source = source_of(data, settings, "mixed")
+    assert [source.problem(part, 0).id for part in ("collect", "test")] == ["own", "own"]
+    with pytest.raises(RunError, match="pose does not lead"):
+        run_stage(READ_WORLDS, data, replace(settings, strict=True))  # though the worlds were read before
 
 
 def test_without_any_class_there_is_no_run(tmp_path: Path) -> None:

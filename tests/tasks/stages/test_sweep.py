@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,14 @@ def test_a_variant_is_trained_once_and_its_figures_are_kept(
     assert rows["parameters"].is_monotonic_decreasing
     assert (rows["hit@1"] <= rows["hit@5"]).all()
     assert sum(map(len, sweep_table(rows).groups)) == 2
+
+
+@pytest.mark.parametrize("experiences", [100, 1_200])
+def test_a_variant_is_trained_for_what_the_run_trains_its_encoders_for(experiences: int) -> None:
+    settings = for_preset("smoke", classes=["trap"], experiences=experiences)
+    own, other = (settings.training(each, 3) for each in sweep.variants(settings)[:2])
+    assert own.by_cells == other.by_cells == (not settings.grown)
+    assert own == replace(other, architecture=own.architecture)
 
 
 def test_an_experience_curve_ends_with_all_experiences() -> None:
