@@ -42,6 +42,11 @@ class GlobalPaths:
         self.rooms = np.zeros(grid.occupied.shape, np.int32) if rooms is None else rooms
 
     @cached_property
+    def room(self) -> Floats:
+        """Metres from the middle of each cell, ``[rows, columns]``, to the nearest that is not free."""
+        return self.grid.resolution * clear_cells(self.grid)
+
+    @cached_property
     def _edges(self) -> sparse.csr_array:
         free = np.pad(~self.grid.occupied, 1)
         cells, rooms = np.arange(free.size).reshape(free.shape), np.pad(self.rooms, 1)

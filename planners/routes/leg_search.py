@@ -64,15 +64,18 @@ class LegSearch:
 
     def begin(self) -> None:
         """Begin another route: its local problems are counted, and named, from 0."""
-        self._attempts = self._most_attempts = self._pose_tries = 0
+        self.attempts = self._most_attempts = self._pose_tries = 0
         self._is_enclosed = False
 
     def legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""
         legs: list[Leg] = []
+        metres = float(ahead.to_go(state[np.newaxis])[0])
+        if math.isinf(metres):
+            return Stuck(ahead.stop.place, "no way that is wide enough leads to the goal", 0)
         options = [self._legs_from(ahead, state)]
-        begun, self._pose_tries, self._is_enclosed = self._attempts, 0, False
-        self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
+        self._pose_tries, self._is_enclosed = 0, False
+        self._most_attempts = self.attempts + ATTEMPTS + int(ATTEMPTS_A_METRE * metres)
         start = nearest = state
         while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
             leg = next(options[-1], None)
@@ -82,15 +85,15 @@ class LegSearch:
             else:
                 options.pop()
                 if not options:
-                    return self._stuck(ahead, start, nearest, max(self._attempts - begun, 1))
+                    return self._stuck(ahead, start, nearest)
                 legs.pop()
             state = legs[-1].end if legs else start
             nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
         return legs
 
-    def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats, tried: int) -> Stuck:
+    def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats) -> Stuck:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
-        place = float(nearest[0]), float(nearest[1])
+        place, tried = (float(nearest[0]), float(nearest[1])), max(self.attempts, 1)
         if self._is_enclosed:
             why = MEANINGS[Status.GOAL_ENCLOSED]
             return Stuck(ahead.stop.place, why, tried, is_enclosed=True)
@@ -108,14 +111,14 @@ class LegSearch:
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
-            if self._attempts == self._most_attempts or self._is_enclosed:
+            if self.attempts == self._most_attempts or self._is_enclosed:
                 break
             if goal.final and ahead.stop.is_pose and not goal.brief:
                 if self._pose_tries == POSE_TRIES:
                     continue
                 self._pose_tries += 1
             problem = self._problem(state, goal)
-            self._attempts += 1
+            self.attempts += 1
             attempt = self._solve(problem, BRIEFLY if goal.brief else usual_limits(problem))
             if attempt.plan is None:
                 self._is_enclosed = goal.final and attempt.status == Status.GOAL_ENCLOSED
@@ -141,7 +144,7 @@ class LegSearch:
             x - before * cos,
             y - before * sin,
             towards,
-            f"{self._name}-route-{self._attempts}",
+            f"{self._name}-route-{self.attempts}",
             self._name,
         )
         along = CANONICAL_START[2]

@@ -56,7 +56,7 @@ class PathAhead:
         Args:
             paths: those over a map's cells.
             stop: where they lead. They end in the nearest free cell that is seen from it, of those that a
-                way leads to; if none is seen there is no path.
+                way leads to; if none is seen, in its own, where no way leads if that is not free.
             scene: what is occupied on the map.
             start: ``[>= 2]`` from where the vehicle comes.
             briefly: whether a pose is never asked for as long as need be.
@@ -64,8 +64,7 @@ class PathAhead:
         self._briefly = briefly
         self.stop, self._scene, self._grid, self._spots = stop, scene, paths.grid, paths.spots
         self._cell_m = paths.grid.resolution
-        free = ~paths.grid.occupied
-        self._room = self._cell_m * np.pad(ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1], 1)
+        self._room = np.pad(paths.room, 1)
         place = np.array(stop.place)
         cells = self._free_cells(place, max(stop.radius, BESIDE_M * stop.is_pose))
         seen = (cell for cell in cells if _in_sight(place, cell, scene))

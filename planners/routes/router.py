@@ -120,14 +120,12 @@ class Router:
             problems[number] = replace(problems[number], start=pose, start_motion=moving)
             more = self._search.legs_to(ahead, state)
             if isinstance(more, Stuck):
-                again = None
-                if not more.is_enclosed:
-                    through = None if more.to_go is None else self._legs_through(stop, state, DOORS)
-                    again = through or self._legs_around(path, stop, state)
-                if again is None:
-                    more = more._replace(why=more.why.replace("the goal", goal))
-                    return more if more.to_go is None else self._at_a_gap(more, more.place, stop.place)
-                more = again
+                more = self._by_other_ways(more, ahead, path, state)
+            if isinstance(more, Stuck):
+                more = more._replace(
+                    why=more.why.replace("the goal", goal), attempts=max(self._search.attempts, 1)
+                )
+                return more if more.to_go is None else self._at_a_gap(more, more.place, stop.place)
             if self._polishes:
                 more = polished_legs(problems[number], more, self._vehicle, self._scene, self._workspace)
             sections.append(more)
@@ -140,23 +138,49 @@ class Router:
         wider = ndimage.binary_dilation(grid.occupied, iterations=max(1, round(ROOMY_M / grid.resolution)))
         return GlobalPaths(replace(grid, occupied=wider), self._paths.spots, self._paths.rooms)
 
-    def _legs_through(self, stop: Stop, state: Floats, doors: int) -> list[Leg] | None:
-        """Search the legs to a stop by way of a pose in the narrowest gap ahead, and so on if need be.
+    def _by_other_ways(
+        self, stuck: Stuck, ahead: PathAhead, path: Floats, state: Floats
+    ) -> list[Leg] | Stuck:
+        """Search the legs to a stop where a search along the shortest ``path [n, 2]`` got ``stuck``."""
+        if stuck.is_enclosed:
+            return stuck
+        legs = None
+        if stuck.to_go is not None:
+            legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), DOORS)
+        return legs or self._legs_around(path, ahead.stop, state) or stuck
+
+    def _legs_through(
+        self, ahead: PathAhead, state: Floats, place: Point, doors: int
+    ) -> list[Leg] | Stuck | None:
+        """Search the legs to a stop by way of a pose in the narrowest gap behind a place, and so on.
 
         A vehicle that is nearly as wide as a door has to be parked in it: that is a pose like one in a slot.
+
+        Args:
+            ahead: the paths to the stop.
+            state: ``[S]`` from which to drive.
+            place: there, or behind the door in which the vehicle stands.
+            doors: that it may be led through, one after another.
+
+        Returns:
+            The legs; None if there are none, or why it is hopeless.
         """
         if doors == 0:
             return None
-        gap = self._narrow_gap((float(state[0]), float(state[1])), stop.place)
+        gap = self._narrow_gap(place, ahead.stop.place)
         pose = None if gap is None else middle_of(gap, self._world)
         if pose is None:
             return None
         x, y, through = pose
-        ahead = 0.5 * (self._vehicle.front - self._vehicle.rear)  # from the reference point to the middle
+        length = self._vehicle.front + self._vehicle.rear
+        behind = x + length * math.cos(through), y + length * math.sin(through)
+        off = 0.5 * (self._vehicle.front - self._vehicle.rear)  # of the middle, ahead of the reference point
         straight = (0.0,) * len(trailers_of(self._vehicle))
         tolerances = (POSE_TOLERANCE,) * len(straight)
         for heading in (through, through + math.pi):
-            place = x - ahead * math.cos(heading), y - ahead * math.sin(heading)
+            place = x - off * math.cos(heading), y - off * math.sin(heading)
+            if not point_is_free(*place, self._scene):
+                continue
             arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0, straight, tolerances)
             parked = Stop(place, POSE_RADIUS, arrival)
             into = self._search.legs_to(
@@ -165,17 +189,18 @@ class Router:
             if isinstance(into, Stuck) or not into:
                 continue
             inside = into[-1].end
-            onward = self._search.legs_to(PathAhead(self._paths, stop, self._scene, inside), inside)
-            if isinstance(onward, Stuck):
-                again = self._legs_through(stop, inside, doors - 1)
-                if again is None:
-                    continue
-                onward = again
-            return into + onward
+            onward: list[Leg] | Stuck | None = self._search.legs_to(ahead, inside)
+            if isinstance(onward, Stuck) and not onward.is_enclosed:
+                onward = self._legs_through(ahead, inside, behind, doors - 1)
+            if onward is not None:
+                return onward if isinstance(onward, Stuck) else into + onward
         return None
 
-    def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | None:
-        """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain."""
+    def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | Stuck | None:
+        """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain.
+
+        Returns None if there are none, or why it is hopeless.
+        """
         metres = length_of(path)
         for wider in self._wider:
             around = PathAhead(wider(), stop, self._scene, state)
@@ -184,7 +209,7 @@ class Router:
                 continue
             if wider is self._wider[-1] or length_of(other) > metres + DETOUR_M:
                 legs = self._search.legs_to(around, state)
-                if not isinstance(legs, Stuck):
+                if not isinstance(legs, Stuck) or legs.is_enclosed:
                     return legs
                 metres = length_of(other)
         return None

@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 
 from planners.attempt import Attempt
+from planners.maps.global_path import passable
 from planners.maps.occupancy_map import OccupancyMap
-from planners.routes.path_ahead import Stop
+from planners.maps.surroundings import surroundings_of
+from planners.routes.leg_search import LegSearch
+from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
+from planners.search.outcome import Status
 from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.authority.authority import faults
-from planners.world.problem import Arrival, Problem
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Arrival, Problem, obstacles_of, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from tests.planners.maps.test_widest_way import CELL_M, GOAL, START, walls
 
@@ -75,6 +80,65 @@ def test_a_door_hardly_wider_than_the_vehicle_is_driven_through(resolution: floa
     found = Router(world, solver, vehicle).route((6.0, 4.0, 0.0), [Stop((26.0, 5.0))])
     assert isinstance(found, Route)
     assert faults(found.problem, found.plan(vehicle), vehicle) == []
+
+
+def asked_for_poses(problem: Problem, limits: Limits) -> Attempt:
+    """Solves what asks for a pose, as if every place were out of reach."""
+    is_pose = problem.arrival is not None and problem.arrival.heading is not None
+    return (solves if is_pose else fails)(problem, limits)
+
+
+def doors_at(*columns: int, size: tuple[int, int]) -> OccupancyMap:
+    """A map ``size`` (rows, columns) of 0.2 m with walls, each of which has a door 1.1 m wide."""
+    occupied = np.zeros(size, bool)
+    occupied[:, columns] = True
+    occupied[size[0] // 2 : size[0] // 2 + 5, columns] = False
+    return OccupancyMap("doors", occupied, 0.2)
+
+
+def test_who_stands_in_a_door_is_led_through_the_next_one() -> None:
+    """The door in which the vehicle stands is as narrow, and nearer."""
+    world = doors_at(50, 100, 150, size=(60, 200))
+    goal = Stop((37.0, 6.5), 0.1, Arrival(0.0, 0.05, 0.0, 0.0))
+    asked: list[Problem] = []
+
+    def solver(problem: Problem, limits: Limits) -> Attempt:
+        asked.append(problem)
+        return asked_for_poses(problem, limits)
+
+    found = Router(world, solver).route((4.0, 6.5, 0.0), [goal])
+    assert isinstance(found, Route)
+    assert faults(found.problem, found.plan(CAR)) == []
+    assert len(asked) <= 40
+
+
+def test_a_goal_that_is_enclosed_behind_a_door_ends_the_search() -> None:
+    def solver(problem: Problem, limits: Limits) -> Attempt:
+        attempt = asked_for_poses(problem, limits)
+        asks_for_goal = problem.arrival is not None and problem.arrival.heading_tolerance < 0.01
+        if asks_for_goal:
+            return replace(attempt, plan=None, solved=False, status=Status.GOAL_ENCLOSED)
+        return attempt
+
+    world = doors_at(300, size=(60, 400))
+    goal = Stop((75.0, 6.5), 0.1, Arrival(0.0, 0.005, 0.0, 0.0))
+    stuck = Router(world, solver).route((8.0, 6.5, 0.0), [goal])
+    assert isinstance(stuck, Stuck)
+    assert stuck.is_enclosed
+    assert stuck.attempts <= 60
+
+
+def test_where_no_way_leads_nothing_is_searched() -> None:
+    world = doors_at(50, size=(60, 100))
+    world.occupied[:, 50] = True
+    problem = Problem("p", "p", (3.0, 3.0, 0.0), (15.0, 6.0), 2.0, (0.0, 0.0, 20.0, 12.0), obstacles_of([]))
+    around, scene, state = surroundings_of(world, 1.0, 0.0), scene_of(problem), start_state(problem)
+    search = LegSearch(around, scene, solves, CAR, "walled")
+    ahead = PathAhead(passable(world, CAR.width, 1.0), Stop(problem.goal), scene, state)
+    stuck = search.legs_to(ahead, state)
+    assert isinstance(stuck, Stuck)
+    assert stuck.to_go is None
+    assert search.attempts == 0
 
 
 def test_it_is_told_in_metres_of_the_map() -> None:
