@@ -8,10 +8,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.search.repair import blocked_states
 from planners.world.arrays import Flags, Floats, Point
 from planners.world.driving_cost import cusps_of, gears_of
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, blocked_states
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import (
@@ -43,7 +42,7 @@ class CheckedPlan(NamedTuple):
 
 def checked(plan: Plan, scene: Scene, vehicle: Vehicle = CAR) -> CheckedPlan:
     """Check every state of ``plan``, driven by ``vehicle``, against the obstacles of ``scene``."""
-    return CheckedPlan(plan, blocked_states(plan, scene, vehicle)[0])
+    return CheckedPlan(plan, blocked_states(plan.states, vehicle, scene))
 
 
 def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]:

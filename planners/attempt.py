@@ -42,7 +42,7 @@ class Attempt:
     collision_checks: int
     expansions: int
     nodes: int
-    length_m: float | None  # None if not solved
+    length_m: float | None  # in real metres, as ``scale`` says; None if not solved
     duration_s: float | None  # None if not solved
     seed: int
     plan: Plan | None

@@ -16,9 +16,10 @@ from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
 from planners.memory_answers import least_blocked
 from planners.search.free_goal import aimed_view
-from planners.search.repair import blocked_states
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
+from planners.world.driving_cost import cost_of
+from planners.world.geometry.collision import blocked_states
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
@@ -74,7 +75,7 @@ def recollections(
     helped_by = "repaired" if attempt.source == "repaired" else "guide"
     looked_at: list[Recollection] = []
     for number, plan in plans.items():
-        blocked, _ = blocked_states(plan, view.scene, vehicle)
+        blocked = blocked_states(plan.states, vehicle, view.scene)
         cells = int(blocked_cells[number])
         missed = max(math.dist(plan.states[-1, :2], problem.goal) - problem.goal_radius, 0.0)
         looked_at.append(
@@ -89,14 +90,13 @@ def recollections(
         )
     if attempt.source != "recalled" or attempt.plan is None:
         return looked_at
-    # the free plan that drives shortest
     free = [each for each in looked_at if each.is_free]
-    quickest = min(free, key=lambda each: len(plans[each.plan].controls), default=None)
-    as_it_is = quickest is not None and len(plans[quickest.plan].controls) == len(attempt.plan.controls)
-    return [
-        each._replace(use="answer" if as_it_is else "polished") if each is quickest else each
-        for each in looked_at
-    ]
+    used = [each for each in free if np.array_equal(plans[each.plan].controls, attempt.plan.controls)]
+    use = "answer" if used else "polished"
+    if attempt.recall != "centroid":  # which takes the first that is free
+        free.sort(key=lambda each: cost_of(plans[each.plan], vehicle))
+    chosen = {each.plan for each in (used or free)[:1]}
+    return [each._replace(use=use) if each.plan in chosen else each for each in looked_at]
 
 
 class MovedDrive(NamedTuple):

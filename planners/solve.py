@@ -130,7 +130,7 @@ def solve(
         collision_checks=int(answer.work[0]),
         expansions=int(answer.work[1]),
         nodes=int(answer.work[2]),
-        length_m=None if plan is None else plan.length_m,
+        length_m=None if plan is None else problem.scale * plan.length_m,
         duration_s=None if plan is None else plan.duration_s,
         seed=seed,
         plan=plan,
@@ -246,12 +246,15 @@ def improved(
     workspace: Workspace | None = None,
 ) -> Attempt:
     """Improve an attempt's plan for some seconds, or look for a first one. Times and counts are added up."""
+    workspace = workspace or Workspace()
+    problem = aimed_view(problem, vehicle, workspace).problem  # that of ``solve``
     more = improve(
         *(attempt.planner, problem, attempt.plan),
         seconds=seconds,
         seed=attempt.seed,
         vehicle=vehicle,
         workspace=workspace,
+        is_polished=attempt.polished,
     )
     attempt = replace(
         attempt,
@@ -268,7 +271,7 @@ def improved(
         status=str(Status.SOLVED),
         solved=True,
         source=attempt.source if more.is_given else "searched",
-        length_m=more.plan.length_m,
+        length_m=problem.scale * more.plan.length_m,
         duration_s=more.plan.duration_s,
         plan=more.plan,
     )

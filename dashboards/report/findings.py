@@ -61,7 +61,7 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
                 f"{100.0 * now['solved']:.1f} % are solved instead of {100.0 * before['solved']:.1f} %."
             )
         answered = now["recalled"] + now["repaired"]
-        sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
+        sentences.append(f"{100.0 * answered:.0f} % of the problems are answered from the memory.")
         returned = _by_planner(used_by_default(as_returned(every))).get(first)
         if returned is not None:
             on = "" if returned["problems"] == now["problems"] else f" (on {returned['problems']:,} of them)"

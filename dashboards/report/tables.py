@@ -103,17 +103,15 @@ def sweep_table(rows: pd.DataFrame) -> CellTable:
 
 
 def experience_table(rows: pd.DataFrame) -> CellTable:
-    """The ``rows`` of ``experience_rows``: a line for each number of experiences."""
+    """The ``rows`` of ``experience_rows``, with ``experiences``, the number asked for: a line for each."""
     panels = list(rows["panel"].unique())
     lines = []
-    for plans, of_count in rows.groupby("plans"):
-        by_panel = of_count.set_index("panel")
-        of_panels = [by_panel.loc[panel] for panel in panels]
-        cells = [
-            _of_oracle(with_interval(row["hit"], row["low"], row["high"], 1), percent(row["oracle"]))
-            for row in of_panels
-        ]
-        lines.append([str(plans), *cells])
+    for experiences, of_count in rows.groupby("experiences"):
+        cells = dict.fromkeys(panels, NOTHING)  # a class that was left out has none
+        for row in of_count.to_dict("records"):
+            hits = with_interval(row["hit"], row["low"], row["high"], 1)
+            cells[row["panel"]] = _of_oracle(hits, percent(row["oracle"]))
+        lines.append([str(experiences), *cells.values()])
     title = "Fresh hit@5 [95 %] and oracle, % of problems"
     return CellTable(title, ["experiences", *panels], [[line] for line in lines], "experience-curve")
 

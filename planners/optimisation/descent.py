@@ -31,7 +31,6 @@ LEAST_SHARE: Final = 0.1  # of the expected gain that a change must bring
 FIRST_DAMPING: Final = 0.01
 MOST_DAMPING: Final = 1e3
 ANY_MOTION: Final = LastMotion(-math.inf, math.inf, math.inf)
-TURN_GAIN: Final = 10.0  # of the controller that drives along points
 
 
 class Stage(NamedTuple):

@@ -101,8 +101,9 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     if vehicle.first_order:  # covered is the step into the state, from its middle
         state = _moved(state, ca.SX.zeros(2), -0.5 * vehicle.dt, vehicle)
     else:
-        speed += vehicle.dt * change[0]
-        sharpest += vehicle.dt * change[1]
+        most = limits_of(vehicle).state_high
+        speed = ca.fmin(speed + vehicle.dt * change[0], max(most[3], -limits_of(vehicle).state_low[3]))
+        sharpest = ca.fmin(sharpest + vehicle.dt * change[1], most[4])
     if isinstance(vehicle, DifferentialDrive):
         turn = sharpest
     else:

@@ -6,9 +6,6 @@ import math
 
 import numpy as np
 
-from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.jit import jit
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
@@ -20,7 +17,7 @@ def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
     gain = vehicle.max_acceleration * vehicle.dt
     speeds = [0.0]
     driven = [0.0]
-    while driven[-1] < distance:
+    while driven[-1] < distance or len(driven) == 1:  # at least one step, on the spot too
         speeds.append(min(speeds[-1] + gain, vehicle.max_speed))
         driven.append(driven[-1] + 0.5 * vehicle.dt * (speeds[-2] + speeds[-1]))
     share = np.minimum(np.array(driven) / max(distance, 1e-9), 1.0)
@@ -32,15 +29,6 @@ def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
     controls = np.zeros((len(driven) - 1, 2))
     controls[:, 0] = np.diff(speeds) / vehicle.dt
     return Plan(states, controls, vehicle.dt)
-
-
-@jit
-def count_blocked(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
-    """Count the states that are in collision of ``states [T, S]``."""
-    blocked = 0
-    for i in range(states.shape[0]):
-        blocked += 1 - count_free_prefix(states[i : i + 1], vehicle, scene)
-    return blocked
 
 
 def resampled(guess: Plan, steps: int) -> Plan:

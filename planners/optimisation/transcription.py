@@ -147,7 +147,7 @@ def transcribe(
         last_low[5 + k] = max(last_low[5 + k], hitch - GOAL_SHY * tolerance)
         last_high[5 + k] = min(last_high[5 + k], hitch + GOAL_SHY * tolerance)
     reach = max(problem.goal_radius - GOAL_SHY_M, 0.0)
-    aligned = [math.cos(GOAL_SHY * arrival.heading_tolerance)] * len(facing)
+    aligned = [math.cos(min(GOAL_SHY * arrival.heading_tolerance, math.pi))] * len(facing)
     dynamics, clear = np.zeros(size * steps), np.full(gaps.numel(), margin_m)
     slid = np.full(sideways.numel(), most)
     return Programme(

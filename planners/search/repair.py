@@ -20,7 +20,7 @@ from planners.search.guides.guidance import guidance
 from planners.search.outcome import Outcome, Status, work_of
 from planners.search.query import Query
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
-from planners.world.arrays import Flags, Floats
+from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
 from planners.world.geometry.occupancy import Bits, window_of
@@ -53,19 +53,6 @@ class RepairSettings:
 
 
 REPAIR = RepairSettings()
-
-
-@lean
-def _fill_blocked(states: Floats, vehicle: Vehicle, scene: Scene, blocked: Flags) -> None:
-    for i in range(states.shape[0]):
-        blocked[i] = not state_is_free(load(states, i, vehicle), vehicle, scene)
-
-
-def blocked_states(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[Flags, int]:
-    """Return which of a plan's states are not free ``[T]``, and how many were checked."""
-    blocked = np.empty(len(stored.states), np.bool_)
-    _fill_blocked(np.ascontiguousarray(stored.states), vehicle, scene, blocked)
-    return blocked, len(blocked)
 
 
 def free_prefix(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[Plan | None, int]:
@@ -181,6 +168,8 @@ def repair(
             beyond_m *= 2.0
         if beyond is not None and not solved:
             last = len(drive.states) - 1
+            if last >= len(controls):
+                break  # vehicles of short steps and low speeds may be that long under way
             states[: last + 1], controls[:last] = drive.states, drive.controls
             ended, end, at = track(
                 *(states, controls, last, reference, at, goal, settings.tracking, vehicle, scene)

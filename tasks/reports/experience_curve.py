@@ -43,4 +43,4 @@ def _rows(data: str, run: RunSettings) -> pd.DataFrame:
         for chunk in MEASURE_RECALL.chunks(data, as_collected(data, run))
         if chunk.index > 0 and chunk.class_name != COMBINED  # runs with fewer experiences have none
     ]
-    return experience_rows(read_recalls(shards))
+    return experience_rows(read_recalls(shards)).assign(experiences=run.experiences)

@@ -167,8 +167,6 @@ class Assistant:
         """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
         canonical, alignment = to_canonical(problem)
         attempt = check_attempt(canonical, self.improved_attempt(canonical), set(), self.vehicle)
-        if attempt.length_m is not None:
-            attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
 
     def recalled(self, problem: Problem, attempt: Attempt) -> list[Plan]:

@@ -7,6 +7,7 @@ from typing import Final
 
 from dashboards.figures.pictures import Example, gallery
 from dashboards.figures.style import save
+from planners.memory.plans.free import turned
 from planners.memory.recall import default_recall
 from planners.solve import solve
 from storage.archives.memories import load_memory
@@ -50,7 +51,7 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
             asked = problem, planner, assist, SHOWN_TOP_K, memory, settings.seed
             attempt = solve(*asked, vehicle=vehicle, polished=False)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.2f} ms"
-            recalled = [memory.plans[i] for i in attempt.recalled]
+            recalled = [turned(memory.plans[i], problem.start[2]) for i in attempt.recalled]
             yield Example(problem, recalled, attempt.plan, caption, vehicle)
 
 

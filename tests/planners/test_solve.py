@@ -11,7 +11,7 @@ from planners.memory.recall import STRATEGIES
 from planners.optimisation import polish
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import ASSISTS, solve
+from planners.solve import ASSISTS, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
@@ -241,3 +241,15 @@ def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
     assert attempt.source == "recalled"
     assert not np.array_equal(attempt.plan.states, memory.plans[4].states)
     assert faults(problem, memory.plans[4]) != []
+
+
+@pytest.mark.parametrize("scale", [0.25, 4.0])
+def test_lengths_of_attempts_are_in_real_metres(scale: float) -> None:
+    asked = strewn(3, 20)
+    usual, other = (solve(replace(asked, scale=each), "lattice") for each in (1.0, scale))
+    assert usual.length_m is not None
+    assert other.length_m == pytest.approx(scale * usual.length_m)
+    assert other.duration_s == usual.duration_s
+    further = improved(other, replace(asked, scale=scale), 0.01)
+    assert further.plan is not None
+    assert further.length_m == pytest.approx(scale * further.plan.length_m)

@@ -22,12 +22,12 @@ from rich.table import Table
 from scipy.stats import bootstrap
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, straight_line
+from planners.optimisation.guesses import straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise, refined
 from planners.search.registry import plan
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
-from planners.world.geometry.collision import Scene, scene_of
+from planners.world.geometry.collision import Scene, blocked_states, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
@@ -71,7 +71,7 @@ def collected(name: str) -> list[Plan]:
 
 def least_blocked(plans: Sequence[Plan], scene: Scene) -> Plan:
     """The plan with the fewest states in collision, the first of equals."""
-    return min(plans, key=lambda each: count_blocked(each.states, CAR, scene))
+    return min(plans, key=lambda each: blocked_states(each.states, CAR, scene).sum())
 
 
 def guesses_for(problem: Problem, stored: Sequence[Plan]) -> dict[str, Callable[[], Plan]]:
@@ -82,7 +82,7 @@ def guesses_for(problem: Problem, stored: Sequence[Plan]) -> dict[str, Callable[
 
     def blocked() -> Plan:
         scene = scene_of(problem)
-        colliding = [each for each in stored if count_blocked(each.states, CAR, scene) > 0]
+        colliding = [each for each in stored if blocked_states(each.states, CAR, scene).sum() > 0]
         return least_blocked(colliding, scene)
 
     def searched() -> Plan:
@@ -107,7 +107,7 @@ def measure(problems: Sequence[Problem], stored: Sequence[Plan]) -> dict[str, li
             found = optimise(problem, guess, COLD if start == STRAIGHT else DEFAULT_SETTINGS)
             seconds = perf_counter() - began
             clearance = np.nan if found.plan is None else least_clearance(problem, found.plan.states, CAR)
-            blocked = count_blocked(guess.states, CAR, scene_of(problem))
+            blocked = blocked_states(guess.states, CAR, scene_of(problem)).sum()
             rows[start].append(Row(found, seconds, blocked, guess.duration_s, clearance))
     return rows
 

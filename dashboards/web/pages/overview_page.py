@@ -183,8 +183,7 @@ def _solved_chart(summary: pd.DataFrame, run: str) -> Chart:
     return Chart(
         "solved",
         "Share of the problems that were solved",
-        "An attempt ends without a plan when the planner has used up its expansions. Such attempts count in "
-        "every time.",
+        "Attempts without a plan count in every time, whatever they ended with.",
         [dots(title, of_panel, "problems solved, %", (lowest, 100.0)) for title, of_panel in panels],
         summary[["panel", "planner", "configuration", "problems", "solved"]],
     )

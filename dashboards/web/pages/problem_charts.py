@@ -19,6 +19,7 @@ from dashboards.web.world_svg import (
     world_svg,
 )
 from dashboards.world_outlines import CheckedPlan
+from planners.world.alignment import scaled
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_names, trailers_of
@@ -58,11 +59,13 @@ def world_chart(
     shown_width, shown_height = shown_size(problem)
     drawing = Drawing("", _SIZE, _SIZE * shown_height / shown_width, world_svg(problem, vehicle, *layers))
     title = f"The world and its plan ({ended})"
-    return Chart("world", title, note, [drawing], _states(plan, vehicle), legend)
+    real = plan and scaled(plan, problem.scale)
+    return Chart("world", title, note, [drawing], _states(real, vehicle), legend)
 
 
-def drive_chart(plan: Plan, vehicle: Vehicle) -> Chart:
-    """Speed and steering of a ``vehicle`` along a ``plan``, over time."""
+def drive_chart(plan: Plan, vehicle: Vehicle, scale: float) -> Chart:
+    """Speed and steering of a ``vehicle`` along a ``plan``, over time, in real metres as ``scale`` says."""
+    plan = scaled(plan, scale)
     times = plan.dt * np.arange(len(plan.states), dtype=float)
     degrees = np.degrees(plan.states)
     turns = isinstance(vehicle, DifferentialDrive)

@@ -55,14 +55,14 @@ def problem(data: DataReader, params: Parameters) -> Page:
     vehicle, plan = data.vehicle(run), replayed.attempt.plan
     show_tree, show_roadmap = params.flag("tree"), params.flag("roadmap")
     charts = [world_chart(drawn, replayed, vehicle, show_tree, show_roadmap)]
-    charts += [drive_chart(plan, vehicle)] if plan is not None else []
+    charts += [drive_chart(plan, vehicle, drawn.scale)] if plan is not None else []
     same = attempts[equals(attempts["problem_id"], row["problem_id"])]
     names = {"problem": row["problem_id"], "class": row["problem_class"], "memory": memory_name(row)}
     base = f"/runs/{params.run}"
     page = position // ROWS + 1 if position > 0 else ""
     values: dict[str, Any] = {
         "facts": _facts(row, replayed),
-        "recalled": _recalled(replayed),
+        "recalled": _recalled(replayed, drawn.scale),
         "note": _note(row, replayed),
         "layers": _layers(params, replayed, show_tree, show_roadmap),
         "drive": drive_frames(plan, vehicle),
@@ -144,16 +144,17 @@ def _note(row: Row, replayed: Replay) -> str:
     )
 
 
-def _recalled(replayed: Replay) -> list[dict[str, Any]]:
+def _recalled(replayed: Replay, scale: float) -> list[dict[str, Any]]:
     table = []
     for order, (recollection, plan) in enumerate(replayed.recalled, start=1):
         first, cells = recollection.first_blocked, recollection.blocked_cells
+        x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
         numbers = [
             str(recollection.plan),
             str(recollection.encoder_rank),
             NOTHING if cells is None else str(cells),
             f"{int(recollection.blocked.sum())} of {len(plan.states)}",
-            NOTHING if first is None else f"({plan.states[first, 0]:.1f}, {plan.states[first, 1]:.1f})",
+            NOTHING if first is None else f"({x:.1f}, {y:.1f})",
         ]
         beaten = recollection.is_free and not recollection.use
         use = "fits, but is not the answer" if beaten else USES[recollection.use]

@@ -14,7 +14,7 @@ from dashboards.palette import BLUE, GREEN, SERIES
 from dashboards.statistics.experience_recall import experience_rows
 from dashboards.statistics.panels import COMBINED
 from dashboards.web.charts import Chart, Drawing, Line, lines
-from dashboards.web.data_reader import DataReader
+from dashboards.web.data_reader import DataReader, class_names
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page, menu
 from dashboards.web.pages.overview_page import faster, faster_ends
@@ -205,8 +205,7 @@ def _recall(measured: list[MeasuredRun]) -> Iterator[Chart]:
 
 def _recall_rows(run: MeasuredRun) -> pd.DataFrame:
     """What the run's memories recalled for their own classes; empty if that was not measured."""
-    classes = [str(name) for name in run.settings["classes"]]
-    shards = [shard for name in classes for shard in run.folder.shards("recalls", name)]
+    shards = [shard for name in class_names(run.settings) for shard in run.folder.shards("recalls", name)]
     try:
         rows = read_recalls(shards)
     except (StorageError, ValueError):

@@ -19,7 +19,7 @@ from planners.memory.memory import Memory, scale_fault
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import solve
-from planners.world.alignment import from_canonical, shifted, to_canonical
+from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import class_or_family, families_of
 from planners.world.classes.problem_classes import CLASSES
@@ -113,15 +113,16 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
     answers = []
     for use, used in [("none", None), (assist, memory)][: 1 if memory is None else 2]:
         attempt, milliseconds = _median(canonical, planner, use, used, vehicle)
-        plan = attempt.plan and shifted(from_canonical(attempt.plan, alignment), problem.offset)
-        answers.append(_answer(use, attempt, milliseconds, plan, vehicle))
+        plan = attempt.plan and from_canonical(attempt.plan, alignment)
+        answers.append(_answer(use, attempt, milliseconds, problem, plan, vehicle))
     return {"answers": answers}
 
 
 def _answer(
-    use: str, attempt: Attempt, milliseconds: float, plan: Plan | None, vehicle: Vehicle
+    use: str, attempt: Attempt, milliseconds: float, problem: Problem, plan: Plan | None, vehicle: Vehicle
 ) -> dict[str, Any]:
-    """An attempt as the editor shows it, in the world's own frame."""
+    """An attempt as the editor shows it, in the world's own frame, and its plan in that of the problem."""
+    own = plan and shifted(scaled(plan, problem.scale), problem.offset)
     return {
         "assist": use,
         "solved": attempt.solved,
@@ -129,10 +130,10 @@ def _answer(
         "ms": milliseconds,
         "checks": attempt.collision_checks,
         "nodes": attempt.nodes,
-        "length_m": plan.length_m if plan else None,
-        "duration_s": plan.duration_s if plan else None,
-        "way": np.round(plan.states[:, :2], 2).tolist() if plan else [],
-        "bodies": _corners(shown_states(plan, vehicle), vehicle) if plan else [],
+        "length_m": own.length_m if own else None,
+        "duration_s": own.duration_s if own else None,
+        "way": np.round(own.states[:, :2], 2).tolist() if own else [],
+        "bodies": _corners(shown_states(plan, vehicle), problem, vehicle) if plan else [],
     }
 
 
@@ -175,11 +176,10 @@ def _problem(fields: Any, vehicle: Vehicle) -> Problem:
 
 
 def _at_start(problem: Problem, vehicle: Vehicle) -> list[Any]:
-    standing = start_state(problem, vehicle)[np.newaxis]
-    standing[:, :2] += problem.offset
-    return _corners(standing, vehicle)
+    return _corners(start_state(problem, vehicle)[np.newaxis], problem, vehicle)
 
 
-def _corners(states: Floats, vehicle: Vehicle) -> list[Any]:
-    """The corners of each part of a body at each of ``states [T, S]``, to a millimetre."""
-    return [np.round(corners, 3).tolist() for corners in outlines(states, vehicle)[0]]
+def _corners(states: Floats, problem: Problem, vehicle: Vehicle) -> list[Any]:
+    """The corners of each part of a body at each of a problem's ``states [T, S]``, as in files, to a mm."""
+    parts = (problem.scale * corners + problem.offset for corners in outlines(states, vehicle)[0])
+    return [np.round(corners, 3).tolist() for corners in parts]

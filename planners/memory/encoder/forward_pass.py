@@ -24,7 +24,6 @@ Forward = Callable[[Bits], Floats32]  # bits [64] of a grid to its embedding [D]
 SIDE = GRID // PATCH  # patches a side
 _TOGETHER = 8  # channels that are added at once, for fewer passes over the hidden units
 _PATCH_BITS = np.uint64((1 << PATCH) - 1)
-_FULL = (1 << PATCH * PATCH) - 1
 
 
 class Tables(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 from planners.optimisation.descent import arrives
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
+from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import LEAST_SPEED, MOST_SPEED, MOST_TURN, SLACK
 from planners.world.jit import jit
 from planners.world.problem import Plan
@@ -46,15 +46,6 @@ def in_asked_motion(controls: Floats, last: Floats, goal: Floats, vehicle: Vehic
             controls[k, c] = min(max(before + missing, -most), most)
             missing -= controls[k, c] - before
     return controls
-
-
-@jit
-def share_blocked(states: Floats, vehicle: Vehicle, scene: Scene) -> float:
-    """Which share of some ``states [T, S]`` meets an obstacle or the bounds."""
-    blocked = 0
-    for i in range(states.shape[0]):
-        blocked += not state_is_free(load(states, i, vehicle), vehicle, scene)
-    return blocked / states.shape[0]
 
 
 @jit

@@ -16,13 +16,12 @@ from planners.optimisation.guesses import resampled
 from planners.optimisation.interior.buffers import Interior
 from planners.optimisation.interior.costs import Hold
 from planners.optimisation.interior.descending import WEAKER, Drive, descend, fill
-from planners.optimisation.interior.drivable import share_blocked
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_in_steps, extra_steps
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, blocked_states
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
@@ -161,7 +160,7 @@ def _found(
             guess = given[k] if attempt.afresh else guesses[k]
             guesses[k], spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
             used += spent
-            if share_blocked(guesses[k].states, vehicle, drive.scene) > effort.most_blocked:
+            if blocked_states(guesses[k].states, vehicle, drive.scene).mean() > effort.most_blocked:
                 del guesses[k]
         left = {}
         costs = {k: guess.duration_s + extras[k] * vehicle.dt for k, guess in guesses.items()}

@@ -244,3 +244,16 @@ def count_free_prefix(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
         if not state_is_free(load(states, i, vehicle), vehicle, scene):
             return i
     return states.shape[0]
+
+
+def blocked_states(states: Floats, vehicle: Vehicle, scene: Scene) -> Flags:
+    """Return which of ``states [T, S]`` are not free, ``[T]``."""
+    blocked = np.empty(len(states), np.bool_)
+    _note_blocked(np.ascontiguousarray(states), vehicle, scene, blocked)
+    return blocked
+
+
+@lean
+def _note_blocked(states: Floats, vehicle: Vehicle, scene: Scene, blocked: Flags) -> None:
+    for i in range(states.shape[0]):
+        blocked[i] = not state_is_free(load(states, i, vehicle), vehicle, scene)

@@ -13,8 +13,10 @@ from tests.dashboards.synthetic import recalls
 
 @pytest.fixture
 def rows() -> pd.DataFrame:
-    made = [recalls(("curves", "trap"), plans=plans, protocols=("fresh",)) for plans in (3, 20, 40)]
-    return pd.concat([experience_rows(each) for each in made], ignore_index=True)
+    made = [(n, recalls(("curves", "trap"), plans=n, protocols=("fresh",))) for n in (3, 20, 40)]
+    return pd.concat(
+        [experience_rows(each).assign(experiences=asked) for asked, each in made], ignore_index=True
+    )
 
 
 def test_a_hit_is_the_mean_over_seeds_with_an_interval_over_problems() -> None:

@@ -13,6 +13,7 @@ from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
     as_csv,
+    experience_table,
     summary_markdown,
     summary_tables,
 )
@@ -107,3 +108,15 @@ def test_csv_reads_back_unrounded(attempt_rows: pd.DataFrame) -> None:
     names = ("panel", "planner", "configuration", "assist", "recall")
     back = back.fillna({"recall": ""}).astype({name: summary[name].dtype for name in names})
     pd.testing.assert_frame_equal(back, summary, rtol=1e-15)
+
+
+def test_a_class_that_a_smaller_run_left_out_has_an_empty_cell() -> None:
+    row = {"hit": 0.5, "low": 0.4, "high": 0.6, "oracle": 0.9}
+    of = [("curves", 40, 40), ("trap", 40, 39), ("curves", 20, 20)]
+    rows = pd.DataFrame(
+        [{"panel": panel, "experiences": asked, "plans": plans, **row} for panel, asked, plans in of]
+    )
+    (fewer,), (all_of_them,) = experience_table(rows).groups
+    assert [fewer[0], all_of_them[0]] == ["20", "40"]
+    assert fewer[2] == NOTHING
+    assert all_of_them[2] == fewer[1]

@@ -269,3 +269,24 @@ def test_a_run_stands_beside_the_one_before_it(tmp_path: Path) -> None:
     for name in ("first", "second"):
         assert "/compare?first" not in client.get(f"/runs/{name}/before").text
     assert VERSIONS[1].why in client.get("/runs/second/before").text  # how its memory was judged
+
+
+def test_live_plans_are_in_the_metres_of_their_world(client: httpx.Client) -> None:
+    answers = []
+    for scale in (1.0, 0.5):
+        world = {
+            "start": [scale * 3.0, scale * 4.0, 0.785],
+            "goal": [scale * 50.0, scale * 50.0],
+            "goal_radius": scale * 2.0,
+            "bounds": [scale * each for each in (-7.0, -7.0, 57.0, 57.0)],
+            "obstacles": [],
+            "scale": scale,
+        }
+        asked = {"world": world, "planner": "lattice", "assist": "repair", "memory": ""}
+        found = client.post("/runs/first/plan", json=asked)
+        assert found.status_code == 200, found.text
+        (answer,) = found.json()["answers"]
+        checked = client.post("/runs/first/check", json=world).json()
+        answers.append([answer["length_m"], answer["way"], answer["bodies"][0], checked["start"][0]])
+    for large, small in zip(*answers, strict=True):
+        np.testing.assert_allclose(small, 0.5 * np.array(large), atol=0.02)

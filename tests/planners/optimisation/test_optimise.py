@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, resampled, straight_line
+from planners.optimisation.guesses import resampled, straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Ending, Optimised, optimise, refined
 from planners.optimisation.transcription import CostWeights
 from planners.search.registry import plan
 from planners.world.authority.authority import faults
-from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import Plan, Problem
+from planners.world.geometry.collision import blocked_states, count_free_prefix, scene_of
+from planners.world.problem import Arrival, Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
 from tests.worlds import box, problem_of
@@ -72,7 +73,7 @@ def test_a_blocked_plan_comes_out_free() -> None:
     assert best is not None
     x, y = best.states[len(best.states) // 2, :2]
     blocked = near(problem_of([*world().obstacles.pieces(), box(x, y, 0.0, 0.4, 0.4)]))
-    assert count_blocked(best.states, CAR, scene_of(blocked)) > 0
+    assert blocked_states(best.states, CAR, scene_of(blocked)).sum() > 0
     found = optimise(blocked, best)
     assert found.plan is not None
     assert_is_a_plan(blocked, found.plan)
@@ -164,3 +165,17 @@ def test_resampling_keeps_ends_and_duration() -> None:
     assert again.states.shape == (18, 5)
     assert again.duration_s == pytest.approx(searched().duration_s)
     np.testing.assert_allclose(again.states[[0, -1]], searched().states[[0, -1]])
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 6.3, math.inf])
+def test_any_tolerance_of_the_heading_is_optimised_for(tolerance: float) -> None:
+    problem = replace(near(problem_of([])), arrival=Arrival(0.8, tolerance))
+    found = optimise(problem, straight_line(problem))
+    assert found.plan is not None
+    assert_is_a_plan(problem, found.plan)
+
+
+def test_the_straight_line_to_where_the_vehicle_is_has_a_step() -> None:
+    problem = replace(problem_of([]), goal=(0.0, 0.0), goal_radius=0.1, arrival=Arrival(2.0, 0.05))
+    assert len(straight_line(problem).controls) == 1
+    optimise(problem, straight_line(problem), DEFAULT_SETTINGS._replace(iterations=5))

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planners.optimisation.guesses import count_blocked
 from planners.optimisation.optimise import optimise
 from planners.optimisation.polish import Polished, polish
 from planners.search.registry import plan
 from planners.world.authority.authority import faults
-from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.geometry.collision import blocked_states, count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
@@ -88,7 +87,7 @@ def test_a_plan_that_is_blocked_a_little_is_freed() -> None:
     found = assert_is_a_plan(problem, polished(problem, searched(problem)).plan)
     x, y = found.states[len(found.states) // 2, :2]
     blocked = problem_of([*problem.obstacles.pieces(), box(x, y, 0.3, 0.4, 0.4)])
-    assert count_blocked(found.states, CAR, scene_of(blocked)) > 0
+    assert blocked_states(found.states, CAR, scene_of(blocked)).sum() > 0
     assert_is_a_plan(blocked, polished(blocked, found).plan)
 
 

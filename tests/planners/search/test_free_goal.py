@@ -18,8 +18,9 @@ from planners.explanation import drive_found
 from planners.memory.library.plan_library import gathered_library
 from planners.search.free_goal import lacks_room, with_free_goal
 from planners.search.outcome import MEANINGS, Status
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import solve
+from planners.solve import improved, solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
@@ -77,6 +78,15 @@ def test_a_pose_beside_a_wall_is_reached_within_its_tolerance(gap: float, vehicl
     found = solve(asked, "lattice", vehicle=vehicle, polished=False).plan
     assert found is not None
     assert faults(asked, found, vehicle) == []
+
+
+def test_improving_looks_for_the_pose_that_was_aimed_at_too() -> None:
+    asked = to_canonical(beside_a_wall(-0.1, CAR))[0]
+    attempt = solve(asked, "lattice", limits=Limits(expansions=1))
+    assert attempt.plan is None
+    found = improved(attempt, asked, 2.0).plan
+    assert found is not None
+    assert faults(asked, found) == []
 
 
 def test_the_drive_that_was_moved_to_a_pose_beside_a_wall_is_found_again() -> None:

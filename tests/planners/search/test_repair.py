@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from planners.search.outcome import Status
 from planners.search.query import Query
 from planners.search.registry import plan
-from planners.search.repair import blocked_states, free_prefix, repair
+from planners.search.repair import free_prefix, repair
 from planners.search.tracking import ARRIVED, BLOCKED, TRACKING, track
 from planners.world.authority.authority import faults
-from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.geometry.collision import blocked_states, count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.goal import goal_of
 from planners.world.problem import start_state
@@ -43,7 +43,7 @@ def repaired(problem, stored, seed=0, vehicle=CAR):
 @settings(max_examples=20, deadline=None)
 def test_blocked_states_begin_where_the_free_prefix_ends(seed, count):
     scene, stored = scene_of(strewn(seed + 100, count)), stored_plan(seed % 3)
-    blocked, _ = blocked_states(stored, scene)
+    blocked = blocked_states(stored.states, CAR, scene)
     free = count_free_prefix(stored.states, CAR, scene)
     count = int(blocked.sum())
     assert free == (int(blocked.argmax()) if blocked.any() else len(blocked))
@@ -64,7 +64,7 @@ def test_a_repaired_plan_is_whole_and_begins_as_the_stored_one(seed, places):
     stored = stored_plan(seed)
     problem = with_boxes_on(stored, places)
     outcome = repaired(problem, stored)
-    blocked, _ = blocked_states(stored, scene_of(problem))
+    blocked = blocked_states(stored.states, CAR, scene_of(problem))
     assert (outcome.plan is not None) == (outcome.status is Status.SOLVED)
     if outcome.plan is None:
         return
@@ -139,3 +139,11 @@ def test_the_controller_stops_before_an_obstacle():
     ended, last, _ = track(states, controls, 0, stored.states, 0, goal, TRACKING, CAR, scene)
     assert ended == BLOCKED
     assert count_free_prefix(states[: last + 1], CAR, scene) == last + 1
+
+
+@pytest.mark.parametrize("longest", [20, 100, 200])
+def test_a_drive_longer_than_the_buffers_is_given_up(monkeypatch, longest):
+    monkeypatch.setattr("planners.search.repair.LONGEST", longest)
+    stored = stored_plan()
+    outcome = repaired(with_boxes_on(stored, [0.45, 0.75]), stored)
+    assert outcome.plan is None or len(outcome.plan.states) <= longest
