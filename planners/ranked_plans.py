@@ -52,7 +52,7 @@ def ranked_plans(
     """
     canonical, alignment = to_canonical(problem)
     if isinstance(memory, Memory) and is_canonical(canonical):
-        return _stored(memory, canonical, problem, alignment, k)
+        return _stored(memory, canonical, problem, alignment, k, workspace)
     library = memory.library if isinstance(memory, Memory) else memory
     view, vehicle = aimed_view(canonical, memory.vehicle, workspace), memory.vehicle
     moved = DriveAnswer()
@@ -65,10 +65,16 @@ def ranked_plans(
 
 
 def _stored(
-    memory: Memory, canonical: Problem, problem: Problem, alignment: Alignment, k: int
+    memory: Memory,
+    canonical: Problem,
+    problem: Problem,
+    alignment: Alignment,
+    k: int,
+    workspace: Workspace | None,
 ) -> list[RankedPlan]:
-    scene, bits = scene_of(canonical), drawing_of(canonical).occupied
-    scores = memory.scores(memory.forward(bits), bits)
+    workspace = workspace or Workspace()
+    scene, bits = scene_of(canonical), drawing_of(canonical, workspace).occupied
+    scores = memory.scores(memory.forward(bits), bits, workspace)
     ranked = []
     for i in best_plans(scores, k).tolist():
         free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)

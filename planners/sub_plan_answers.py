@@ -154,7 +154,7 @@ def sub_plan_answer(
         return NOTHING  # nothing has to be driven
     exact = asks_for_more(goal)
     near = place(*problem.goal, max(NEAR_M, problem.goal_radius)) if exact else goal
-    offset = 0 if blindly is None else int(blindly.integers(1, len(subs.begins)))
+    offset = 0 if blindly is None else int(blindly.integers(1, max(len(subs.begins), 2)))
     cells, scene = Cells(view.bits, window_of(problem)), view.scene
     x, y = problem.goal[0] - start[0], problem.goal[1] - start[1]
     metres = max(math.hypot(x, y) - float(near[RADIUS]), 0.0)

@@ -24,6 +24,7 @@ from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.arrays import Flags, Floats, Integers
+from planners.world.driving_cost import cost_of
 from planners.world.jit import jit
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
@@ -52,7 +53,7 @@ def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR)
     sweeps = sweep_plans([candidate.plan for candidate in candidates], vehicle)
     labels = label_problems([candidates[i].problem for i in first[:PROBLEMS]], sweeps).free
     labels &= owners != np.arange(len(labels))[:, np.newaxis]
-    durations = np.array([each.plan.duration_s for each in candidates])
+    durations = np.array([cost_of(each.plan, vehicle) for each in candidates])
     quickest = np.full(len(numbers), np.inf)
     np.minimum.at(quickest, owners, durations)
     return choose(labels, durations, quickest[: len(labels)] + MISSED_S, count, owners)
@@ -63,7 +64,7 @@ def choose(labels: Flags, durations: Floats, without: Floats, count: int, owners
 
     Args:
         labels: ``[M, N]`` which plans are free in which problem.
-        durations: ``[N]`` driving times of the plans, in seconds.
+        durations: ``[N]`` what the plans cost to drive, in seconds.
         without: ``[M]`` what a problem costs without any plan, in seconds.
         count: how many plans to choose.
         owners: ``[N]`` which problem each plan was made for.

@@ -19,6 +19,7 @@ from planners.memory.plans.sweeps import PlanSweeps
 from planners.memory.ranking.inverted_lists import InvertedLists
 from planners.memory.ranking.readout import nearest_readout
 from planners.world.arrays import Floats32, Integers
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -73,14 +74,14 @@ class Memory:
         return nearest_readout(self.centroids, 0.0)
 
     @functools.cached_property
-    def durations(self) -> Floats32:
-        """How long each plan takes to drive, ``[N]`` seconds."""
-        return np.array([plan.duration_s for plan in self.plans], np.float32)
+    def costs(self) -> Floats32:
+        """What it costs to drive each plan, ``[N]`` seconds: how long it takes, if nothing else counts."""
+        return np.array([cost_of(plan, self.vehicle) for plan in self.plans], np.float32)
 
     @functools.cached_property
-    def by_time(self) -> Integers:
-        """All plans ``[N]``, the quickest to drive first."""
-        return np.argsort(self.durations, kind="stable").astype(np.int32)
+    def by_cost(self) -> Integers:
+        """All plans ``[N]``, the cheapest to drive first."""
+        return np.argsort(self.costs, kind="stable").astype(np.int32)
 
     @functools.cached_property
     def library(self) -> PlanLibrary:

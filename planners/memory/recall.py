@@ -120,7 +120,7 @@ def recall(
         elif len(tries) > (told := max(DECISIVE, 3 * len(order) // 4)):
             decisive = order[:told]
     if tries is None:
-        tries = shortest_first(memory, order, likely)
+        tries = cheapest_first(memory, order, likely)
     view.lap("recall")
     free, checks = first_check(memory, view, tries, as_stored, decisive)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
@@ -130,19 +130,19 @@ def among_the_first(memory: Memory, view: View, k: int) -> Recalled:
     """Recall from the first plans of a large memory, by blocked cells, for a problem of their heading."""
     ranking = rank_by_cells(memory.masks[:TRIED_EARLY], view.bits, view.workspace)
     order = ranking.order[: min(CHECKED_EARLY, int(ranking.ends[WORTH_CELLS]))]
-    tries = shortest_first(memory, order[: int(ranking.ends[LIKELY_CELLS])], len(order))
+    tries = cheapest_first(memory, order[: int(ranking.ends[LIKELY_CELLS])], len(order))
     view.lap("recall")
     free, checks = first_check(memory, view, tries, as_stored=True)
     return Recalled(_with(free, order[:k].tolist(), k), free, checks)
 
 
-def shortest_first(memory: Memory, order: Integers, likely: int) -> Integers:
-    """Order the first ``likely`` plans of ``order [n]`` by driving time, the shortest first.
+def cheapest_first(memory: Memory, order: Integers, likely: int) -> Integers:
+    """Order the first ``likely`` plans of ``order [n]`` by what it costs to drive them, the cheapest first.
 
     The others follow as they stand, the least blocked first.
     """
     head = order[:likely]
-    return np.concatenate((head[np.argsort(memory.durations[head], kind="stable")], order[likely:]))
+    return np.concatenate((head[np.argsort(memory.costs[head], kind="stable")], order[likely:]))
 
 
 def _with(free: int, head: list[int], k: int) -> tuple[int, ...]:
@@ -216,11 +216,11 @@ def by_cells(
     to check, in order.
     """
     if among is None:
-        masks, by_time = memory.masks, memory.by_time
+        masks, by_cost = memory.masks, memory.by_cost
     else:
         masks = memory.masks[among]
-        by_time = np.argsort(memory.durations[among], kind="stable").astype(np.int32)
-    ranking, tries = rank_to_try(masks, view.bits, by_time, LIKELY_CELLS, POSSIBLE_CELLS, view.workspace)
+        by_cost = np.argsort(memory.costs[among], kind="stable").astype(np.int32)
+    ranking, tries = rank_to_try(masks, view.bits, by_cost, LIKELY_CELLS, POSSIBLE_CELLS, view.workspace)
     if among is None:
         return ranking.order, ranking.ends, tries
     return among[ranking.order], ranking.ends, among[tries]

@@ -106,7 +106,8 @@ def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: 
     for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
         try:
-            problems.append((no_plan(sweeps, source.draw, rng, name, index, bounds), NO_PLAN))
+            made = no_plan(sweeps, source.draw, rng, name, index, bounds, chunk.vehicle.scale)
+            problems.append((made, NO_PLAN))
         except NeverBlockedError:  # then there is no such problem to learn from
             break
     wanted = round(DRAWN_SHARE * settings.taught * settings.problems_per_experience)

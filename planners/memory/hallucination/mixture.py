@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -72,13 +73,6 @@ def hallucinate(
     while True:
         index += 1
         which = int(np.searchsorted(limits[:-1], limits[-1] * rng.random(), side="right"))
-        problem = Problem(
-            id=f"{origin.id}~{names[which]}-{index}",
-            class_name=origin.class_name,
-            start=origin.start,
-            goal=origin.goal,
-            goal_radius=origin.goal_radius,
-            bounds=origin.bounds,
-            obstacles=samplers[which](draw, rng),
-        )
+        made = f"{origin.id}~{names[which]}-{index}"
+        problem = replace(origin, id=made, obstacles=samplers[which](draw, rng))
         yield Hallucination(problem, names[which])

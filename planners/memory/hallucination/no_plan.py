@@ -31,6 +31,7 @@ def no_plan(
     class_name: str,
     index: int,
     bounds: Bounds = BOUNDS,
+    scale: float = 1.0,
 ) -> Problem:
     """Make problem number ``index`` of ``S_0``: a draw of the class, and more obstacles to block every plan.
 
@@ -41,6 +42,7 @@ def no_plan(
         class_name: of the problem.
         index: the problem's number, for its id.
         bounds: x_min, y_min, x_max, y_max in metres.
+        scale: how many metres of the vehicle's world are one of these.
 
     Raises:
         NeverBlockedError: The obstacles of the class never block some plan.
@@ -58,6 +60,7 @@ def no_plan(
                 goal_radius=GOAL_RADIUS,
                 bounds=bounds,
                 obstacles=obstacles,
+                scale=scale,
             )
         obstacles = _with_blocking(obstacles, draw(rng), sweeps, free, everywhere)
     raise NeverBlockedError(

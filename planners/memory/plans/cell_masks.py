@@ -147,7 +147,7 @@ def rank_by_cells(masks: Bits, occupied: Bits, workspace: Workspace | None = Non
 def _rank_to_try(
     masks: Bits,
     occupied: Bits,
-    by_time: Integers,
+    by_cost: Integers,
     likely: int,
     possible: int,
     ranking: Ranking,
@@ -157,7 +157,7 @@ def _rank_to_try(
     few = ranking.ends[likely]
     most = min(ranking.ends[possible], POSSIBLE_FOR_EACH_LIKELY * few)
     filled = 0
-    for i in by_time:
+    for i in by_cost:
         if ranking.cells[i] <= likely:
             tries[filled] = i
             filled += 1
@@ -167,7 +167,7 @@ def _rank_to_try(
 
 
 def rank_to_try(
-    masks: Bits, occupied: Bits, by_time: Integers, likely: int, possible: int, workspace: Workspace
+    masks: Bits, occupied: Bits, by_cost: Integers, likely: int, possible: int, workspace: Workspace
 ) -> tuple[Ranking, Integers]:
     """Rank N plans by how many of their swept cells are not free, and choose which to check, in what order.
 
@@ -178,7 +178,7 @@ def rank_to_try(
     Args:
         masks: ``[N, 64]`` the cells that each plan sweeps.
         occupied: ``[64]`` the cells that are not free.
-        by_time: ``[N]`` the plans, the quickest to drive first.
+        by_cost: ``[N]`` the plans, the cheapest to drive first.
         likely: blocked cells.
         possible: blocked cells.
         workspace: the caller's buffers, which the next ranking of N plans overwrites.
@@ -188,7 +188,7 @@ def rank_to_try(
     """
     ranking = workspace.buffers(allocate_ranking, len(masks))
     tries = workspace.buffers(allocate_tries, len(masks))
-    count = _rank_to_try(masks, occupied, by_time, likely, possible, ranking, tries)
+    count = _rank_to_try(masks, occupied, by_cost, likely, possible, ranking, tries)
     return ranking, tries[:count]
 
 

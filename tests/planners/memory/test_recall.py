@@ -22,10 +22,12 @@ from planners.memory.recall import (
     rank,
     recall,
 )
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import bits_of, occupancy_of
 from planners.world.problem import CANONICAL_GOAL
 from planners.world.randomness import generator
+from planners.world.vehicles.vehicle import Costs
 from planners.world.view import View
 from tests.planners.memory.untrained import PLANS, untrained_memory
 
@@ -81,7 +83,7 @@ def test_no_free_plan_among_those_recalled_drives_shorter(memory, problem_in, se
     found = recalled_by(memory, problem, strategy, k)
     if found.free >= 0:
         free = [i for i in found.plans if free_in(memory, problem)[i]]
-        assert memory.durations[found.free] == memory.durations[free].min()
+        assert memory.costs[found.free] == memory.costs[free].min()
 
 
 @given(seed=SEEDS, k=st.integers(1, 12), count=st.integers(0, 12))
@@ -92,7 +94,7 @@ def test_of_plans_with_few_blocked_cells_exhaustive_finds_the_one_that_drives_sh
     likely = likely_in(memory, problem)
     if likely.any():
         free = recalled_by(memory, problem, "exhaustive", k).free
-        assert memory.durations[free] == memory.durations[likely].min()
+        assert memory.costs[free] == memory.costs[likely].min()
 
 
 @given(seed=SEEDS, count=st.integers(0, 12))
@@ -257,3 +259,11 @@ def test_a_wrong_question_is_refused(memory, experiences, strategy, k):
 def test_blindly_needs_a_generator(memory, experiences):
     with pytest.raises(ValueError, match="pass an rng"):
         recall(memory, View(experiences[0].problem), "random", 1)
+
+
+def test_plans_are_ordered_by_what_they_cost_to_drive(memory):
+    for costs in (memory.vehicle.costs, Costs(gear_change=5.0, forwards=3.0)):
+        vehicle = memory.vehicle._replace(costs=costs)
+        seconds = np.array([cost_of(each, vehicle) for each in memory.plans], np.float32)
+        ordered = dataclasses.replace(memory, vehicle=vehicle).by_cost
+        assert ordered.tolist() == np.argsort(seconds, kind="stable").tolist()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import islice
 
@@ -75,6 +76,15 @@ def test_the_plan_that_a_problem_was_made_for_stays_free(name: str, method: str,
     assert label_problems(problems, experience.sweep).free.all()
     for problem in problems:
         assert faults(problem, experience.plan, VEHICLES[name]) == []
+
+
+def test_made_problems_are_of_the_scale_of_their_vehicle() -> None:
+    (experience, *_), scale = experiences_of("car"), 0.25
+    small = replace(experience, problem=replace(experience.problem, scale=scale))
+    around = hallucinate(small, {"rearrange": 1.0}, draw, generator(1))
+    made = [each.problem for each in islice(around, 6)]
+    made.append(no_plan(experience.sweep, draw, generator(1), "boxes", 0, scale=scale))
+    assert {problem.scale for problem in made} == {scale}
 
 
 @pytest.mark.parametrize("name", VEHICLES)

@@ -165,6 +165,9 @@ def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time()
         "q", "q", (0.0, 0.0, math.pi / 4), (x, y), 0.3, empty.bounds, empty.obstacles, 1.0, (1.0,)
     )
     asked = to_canonical(asked)[0]
+    blind = first(asked, "gust", "random-closed", memory=library)  # of one part there is nothing to pick
+    assert blind.plan is not None
+    assert faults(asked, blind.plan, CAR) == []
     durations: list[float] = []
     for each in (asked, mirrored(asked)):
         answer = first(each, "gust", "closed", memory=library)  # for GUST no free plan is a detour

@@ -115,10 +115,10 @@ def test_likely_plans_are_tried_by_driving_time_and_then_some_possible_ones_by_c
     possible += likely
     masks = rng.integers(0, 2**64, (plans, 64), np.uint64) & rng.integers(0, 2**64, (plans, 64), np.uint64)
     occupied = np.where(rng.random(64) < 0.05, rng.integers(0, 2**64, 64, np.uint64), np.uint64(0))
-    by_time = rng.permutation(plans).astype(np.int32)
-    ranking, tries = rank_to_try(masks, occupied, by_time, likely, possible, Workspace())
+    by_cost = rng.permutation(plans).astype(np.int32)
+    ranking, tries = rank_to_try(masks, occupied, by_cost, likely, possible, Workspace())
     cells = np.bitwise_count(masks & occupied).sum(1)
     np.testing.assert_array_equal(ranking.cells, cells)
-    first = [i for i in by_time if cells[i] <= likely]
+    first = [i for i in by_cost if cells[i] <= likely]
     others = [i for i in np.argsort(cells, kind="stable") if likely < cells[i] <= possible]
     assert tries.tolist() == first + others[: 2 * len(first)]
