@@ -138,7 +138,8 @@ def improve(
         """Keep a plan if it is the best, as it is or polished; say whether it is."""
         nonlocal spent
         kept = keep(plan)  # at once: polishing takes milliseconds
-        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
+        affordable = max(most - spent, 0) / EXPANSIONS_AN_ITERATION
+        iterations = int(min(affordable, most_iterations(problem)))
         left = seconds - (working_clock() - began)
         around = vehicle, scene, workspace
         _, better = polish_quickest(problem, [plan], *around, iterations, seconds=left, below_s=below_s)

@@ -235,4 +235,4 @@ def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
     """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
     steps = max(lattice.steps + int(3.0 * query.rng.random()) - 1, 1)
-    return lattice._replace(greed=greed, steps=steps, turn=0.7 + 0.6 * query.rng.random())
+    return lattice._replace(greed=greed, steps=steps, turn=lattice.turn * (0.7 + 0.6 * query.rng.random()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle,
 BEHIND_M: Final = 8.0  # room for trailers behind the start of canonical problems
 SCALES: Final = (2.0**-6, 2.0**6)
 ANGLES: Final = 41  # hitch angles at which bodies may not meet
+FOLDS: Final = 7  # of each hitch, for bodies that are not neighbours
 
 
 def check_sizes(vehicle: Vehicle) -> None:
@@ -39,6 +41,35 @@ def check_sizes(vehicle: Vehicle) -> None:
                     f"{abs(angle):.2f} rad; give a smaller max_hitch, a longer hitch_length or shorter bodies"
                 )
         ahead = trailer
+    _check_folded(vehicle)
+
+
+def _check_folded(vehicle: Vehicle) -> None:
+    """Raise ValueError, the end of a sentence, if bodies that are not neighbours meet when it is folded."""
+    trailers = trailers_of(vehicle)
+    if len(trailers) < 2:
+        return
+    from shapely import affinity  # late: few commands need it
+
+    shapes = [_shape(body) for body in (vehicle, *trailers)]
+    angles = [np.linspace(-each.max_hitch, each.max_hitch, FOLDS).tolist() for each in trailers]
+    for hitches in itertools.product(*angles):
+        x = y = heading = 0.0
+        bodies = shapes[:1]
+        for trailer, shape, hitch in zip(trailers, shapes[1:], hitches, strict=True):
+            heading -= hitch
+            x -= trailer.hitch_length * math.cos(heading)
+            y -= trailer.hitch_length * math.sin(heading)
+            turned = affinity.rotate(shape, heading, origin=(0.0, 0.0), use_radians=True)
+            bodies.append(affinity.translate(turned, x, y))
+        for one, other in itertools.combinations(range(len(bodies)), 2):
+            if other > one + 1 and bodies[one].intersects(bodies[other]):
+                names = [f"trailer {k}" if k else "a body in front" for k in (one, other)]
+                told = ", ".join(f"{hitch:.2f}" for hitch in hitches)
+                raise ValueError(
+                    f"has {names[0]} and {names[1]} that touch each other at hitch angles of {told} rad; "
+                    "give a smaller max_hitch, a longer hitch_length or shorter bodies"
+                )
 
 
 def scale_for(vehicle: Vehicle) -> float:

@@ -45,7 +45,7 @@ def weight_of_error(c: int, goal: Floats, hold: Hold, vehicle: Vehicle) -> float
         asked = goal[HEADING_TOLERANCE] < math.inf
         return hold.pull * bend_of_error(goal[HEADING_TOLERANCE]) if asked else 0.0
     elif c == 3:
-        asked = goal[MOST_SPEED] - goal[LEAST_SPEED] < math.inf
+        asked = goal[MOST_SPEED] < math.inf or goal[LEAST_SPEED] > -math.inf
         return 2.0 * MOTION_OFF / (vehicle.max_speed * vehicle.max_speed) if asked else 0.0
     elif c == 4:
         most = turn_limit(vehicle)

@@ -22,8 +22,9 @@ def run_seconds(metres: float, first: float, last: float, top: float, accelerati
     peak = math.sqrt(acceleration * metres + 0.5 * (first * first + last * last))
     if peak <= top:
         return (2.0 * peak - first - last) / acceleration
-    rest = metres - (2.0 * top * top - first * first - last * last) / (2.0 * acceleration)
-    return (2.0 * top - first - last) / acceleration + rest / top
+    changing = abs(top * top - first * first) + abs(top * top - last * last)
+    rest = metres - changing / (2.0 * acceleration)
+    return (abs(top - first) + abs(top - last)) / acceleration + rest / top
 
 
 @inlined

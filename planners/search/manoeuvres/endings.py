@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, add_known_node
+from planners.search.manoeuvres.pose_tree import CHECKS, NODES, SIZE, PoseTree, add_known_node
 from planners.search.query import Endings
 from planners.world.arrays import Floats, Indices, Integers
 from planners.world.driving_cost import STANDING, extra_cost
@@ -16,7 +16,7 @@ from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load
-from planners.world.vehicles.vehicle import Vehicle, state_size
+from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
 
 FARTHEST: Final = 4.0  # from the goal, in the length of vehicle and trailers: where an ending begins
 
@@ -26,7 +26,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
 
     Each is given as its ``states [T, S]`` and ``controls [T - 1, 2]``. Without a stop at the end: left out.
     """
-    size = vehicle.front + vehicle.rear + sum(each.hitch_length for each in getattr(vehicle, "trailers", ()))
+    size = vehicle.front + vehicle.rear + sum(each.hitch_length for each in trailers_of(vehicle))
     states, controls, starts, follows = [], [], [0], []
     for drive, steering in plans:
         stands = np.abs(drive[:, 3]) < STANDING
@@ -101,6 +101,8 @@ def add_endings(tree: PoseTree, endings: Endings, nodes: Integers, vehicle: Vehi
     """Add the stops from which what is known leads freely to the goal; ``nodes [K]``: numbers, or -1."""
     for k in range(endings.follows.shape[0]):
         nodes[k] = -1
+        if tree.counts[SIZE] == NODES:
+            continue
         parent = 0
         if endings.follows[k] >= 0:
             parent = nodes[endings.follows[k]]

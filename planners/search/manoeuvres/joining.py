@@ -71,9 +71,9 @@ def allocate_join(state_size: int) -> Join:
 
 
 @inlined
-def _along(state: State, gear: float, bend: float, metres: float, vehicle: Vehicle) -> State:
-    """The end of an arc, whatever is in the way."""
-    count = math.ceil(metres / (COARSE * stride_of(gear, vehicle)))
+def _along(state: State, gear: float, bend: float, metres: float, stride: float, vehicle: Vehicle) -> State:
+    """The end of an arc, whatever is in the way, in steps of ``COARSE`` strides."""
+    count = math.ceil(metres / (COARSE * stride))
     if count == 0:
         return state
     speed = gear * metres / (count * vehicle.dt)
@@ -87,7 +87,8 @@ def _along_number(state: State, join: Join, k: int, sign: float, changed: int, v
     """The end of arc number ``k``, driven on (``sign`` 1) or back (-1); ``changed`` as in ``_ends``."""
     bend = join.arcs[1, k] + (NUDGE if changed == 2 * k else 0.0)
     metres = join.arcs[2, k] + (NUDGE if changed == 2 * k + 1 else 0.0)
-    return _along(state, sign * join.arcs[0, k], bend, metres, vehicle)
+    gear = join.arcs[0, k]
+    return _along(state, sign * gear, bend, metres, stride_of(gear, vehicle), vehicle)
 
 
 @lean

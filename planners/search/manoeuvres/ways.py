@@ -198,7 +198,7 @@ def meeting_is_worth(
     ways: Ways, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
 ) -> bool:
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
-    gear = 1.0 if before.metres[last] > 0.0 else -1.0
+    gear = 0.0 if last == 0 else (1.0 if before.metres[last] > 0.0 else -1.0)
     seconds = _joined_seconds(
         tree, node, before.runs[last], gear, before.seconds[last] + before.extras[last], vehicle
     )

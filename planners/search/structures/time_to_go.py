@@ -48,7 +48,7 @@ def _seconds_to_stop(
     squares = speed * speed + 2.0 * acceleration * metres
     end = min(most, math.sqrt(squares))
     if braking > metres:
-        return (speed - most) / acceleration + late_s * (braking - metres)
+        return (abs(speed) - most) / acceleration + late_s * (braking - metres)
     peak = min(math.sqrt(0.5 * (squares + end * end)), vehicle.max_speed)
     changing = (2.0 * peak * peak - speed * speed - end * end) / (2.0 * acceleration)
     return (2.0 * peak - speed - end) / acceleration + max(metres - changing, 0.0) / vehicle.max_speed

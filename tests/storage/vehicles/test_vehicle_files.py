@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, VEHICLES
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, VEHICLES, Trailer
 from storage.errors import StorageError
 from storage.vehicles.definitions import definition_of, first_difference, vehicle_of
 from storage.vehicles.recorded_vehicle import refuse_another
+from storage.vehicles.sizes import check_sizes
 from storage.vehicles.vehicle_files import (
     BUILT_IN,
     label_of,
@@ -271,3 +273,12 @@ def test_a_vehicle_with_a_file_has_its_own_scale() -> None:
     assert scale_for_vehicle(2.0, CAR) == 2.0
     with pytest.raises(ValueError, match="scale is 2, but the scale of small is 4"):
         scale_for_vehicle(2.0, big)
+
+
+@pytest.mark.parametrize(("fold", "meets"), [(1.57, True), (0.6, False)])
+def test_bodies_that_are_not_neighbours_must_not_meet_either(fold: float, meets: bool) -> None:
+    """The second trailer swings round a short first one into the side of the car."""
+    body = Trailer(0.8, 0.1, 0.3, 0.6, fold), Trailer(1.0, 0.3, 0.5, 1.0, fold)
+    vehicle = CAR_2_TRAILERS._replace(front=1.5, rear=0.2, width=1.0, trailers=body)
+    with pytest.raises(ValueError, match="trailer 2") if meets else nullcontext():
+        check_sizes(vehicle)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from time import perf_counter
 
 import numpy as np
 import pytest
 
 from planners.search.manoeuvres import suitability
+from planners.search.manoeuvres.arcs import LEAST, STRIDE, stride_of
 from planners.search.outcome import Status
 from planners.search.query import Limits
 from planners.search.registry import plan
@@ -21,6 +23,7 @@ from planners.world.problem import Arrival, Plan, Problem, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.vehicles.vehicle_files import said_vehicle
+from tests.worlds import strewn
 
 LIMITS = Limits(expansions=6000)
 
@@ -115,6 +118,12 @@ def test_a_trailer_is_backed_to_a_dock() -> None:
         assert faults(problem, found, CAR_1_TRAILER) == []
 
 
+LIMITED = [
+    said_vehicle(f"docs/vehicles/{name}")
+    for name in ("forklift.yaml", "turtlebot.yaml", "benchmarks/dynobench-unicycle2-v0.yaml")
+]
+
+
 def at_the_kerb(length: float) -> Problem:
     """Into a slot of a ``length`` between two vehicles, 0.3 m deeper than the car is wide."""
     kerb, deep = obstacle(0, -1, 50, 0), CAR.width + 0.3
@@ -154,3 +163,30 @@ def test_a_goal_in_a_lane_that_leads_out_of_sight_is_not_called_enclosed() -> No
     found = solve(to_canonical(problem)[0], "lattice", limits=Limits(expansions=20_000))
     assert not found.solved
     assert found.status != Status.GOAL_ENCLOSED
+
+
+def test_a_search_for_something_better_is_not_ended_because_all_that_is_found_costs_more() -> None:
+    problem = replace(strewn(0, 0), goal=(14.0, 12.0), goal_radius=0.1, arrival=Arrival(0.8, 0.05, 0.0, 0.0))
+    problem = to_canonical(problem)[0]
+    quick = solve(problem, "lattice").duration_s
+    assert quick is not None
+    limits = Limits(expansions=3_000, bound_s=0.9 * quick)
+    found = plan("lattice", problem, generator(0), limits=limits)
+    assert (found.plan, found.status) == (None, Status.BUDGET_SPENT)
+
+
+@pytest.mark.parametrize("backwards", [0.0, -1e-6, -0.5, -4.0])
+def test_strides_are_at_most_a_step_or_a_small_share_of_the_length(backwards: float) -> None:
+    vehicle, length = CAR._replace(min_speed=backwards), CAR.front + CAR.rear
+    assert stride_of(1.0, vehicle) == min(STRIDE * length, vehicle.max_speed * vehicle.dt)
+    stride, step = stride_of(-1.0, vehicle), -backwards * vehicle.dt
+    assert (stride == 0.0) == (backwards == 0.0)
+    assert min(step, LEAST * length) <= stride <= max(step, LEAST * length)
+
+
+def test_a_vehicle_that_hardly_drives_backwards_is_not_looked_at_for_ever() -> None:
+    vehicle = CAR._replace(min_speed=-1e-6)
+    problem = to_canonical(at_the_kerb(CAR.front + CAR.rear + 3.0))[0]
+    began = perf_counter()
+    solve(problem, "lattice", limits=Limits(expansions=500), vehicle=vehicle)
+    assert perf_counter() - began < 20.0
