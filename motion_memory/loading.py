@@ -105,18 +105,20 @@ def _warmed(ready: Memory) -> Memory:
     library = ready.stored if isinstance(ready.stored, PlanLibrary) else ready.stored.library
 
     alone = replace(ready, assist="none")
-    narrow = replace(family(families_of(ready.vehicle)[0], "easy", ready.vehicle).draw(0, 0), scale=scale)
     for each in (ready, alone):  # recall, then search
         ask(each)
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
-        each.plan(narrow)
+    for name in families_of(ready.vehicle)[:1]:  # there is none for a vehicle that cannot drive backwards
+        narrow = replace(family(name, "easy", ready.vehicle).draw(0, 0), scale=scale)
+        ready.plan(narrow)
+        alone.plan(narrow)
+        slot = to_canonical(narrow)[0]
+        stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
+        driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # few plans need pressing
+        guidance([stands])  # along a drive that is improved, as few are
     asked = first_question(library, scale)
     if asked is not None:
         ready.plan(asked)
     ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
     ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
-    slot = to_canonical(narrow)[0]
-    stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
-    driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # pressing, which few plans need
-    guidance([stands])  # along a drive that is improved, as few are
     return ready

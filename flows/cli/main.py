@@ -172,10 +172,11 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
     forced_exit.daemon = True
     forced_exit.start()
-    command, told = set(sys.argv[1:2]), "Interrupted. Repeat the command to continue where it stopped."
-    if command & SERVERS:
+    command = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
+    told = "Interrupted. Repeat the command to continue where it stopped."
+    if command in SERVERS:
         told = "Stopped."
-    elif command & STARTING_OVER:
+    elif command in STARTING_OVER:
         told = "Interrupted. Nothing was kept: repeat the command to start over."
     print(told, file=sys.stderr)
     raise KeyboardInterrupt

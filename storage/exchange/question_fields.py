@@ -36,6 +36,8 @@ def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float,
     names = state_names(vehicle)[3:]
     hitches = [name for name in names if name.startswith("hitch")]
     _refuse_other_hitches(fields, len(hitches), vehicle)
+    if all(fields.get(name) is None for name in (*STARTS, "start_hitch")):
+        return ()  # as slow as it can be, and straight
     motion = dict.fromkeys(names, 0.0)
     motion["speed"] = max(vehicle.scale * vehicle.min_speed, 0.0)  # as slow as it can be
     for field, name in STARTS.items():
@@ -147,7 +149,7 @@ def hint_of_tolerance(fields: Mapping[str, Any], vehicle: Vehicle) -> str | None
     field, usual, lengths = (
         ("goal_tolerance", POSE_RADIUS, 0.5) if is_pose else ("goal_radius", GOAL_RADIUS, 2.0)
     )
-    length = vehicle.scale * (vehicle.front + vehicle.rear)
+    length = float(fields.get("scale") or vehicle.scale) * (vehicle.front + vehicle.rear)
     if fields.get(field) is not None or usual <= lengths * length:
         return None
     return (

@@ -100,6 +100,8 @@ def source_at(path: Path, named: str | None = None) -> Source:
         raise StorageError(f"{path} does not exist; check the name.")
     class_of(path)  # raises if the name cannot be that of a class
     if path.is_dir():
+        if named in MAPS.values() and named not in WORLDS.values():
+            raise StorageError(f"{path} is a folder, and {named} is a format of maps; name one map in it.")
         return Source(path, named or _format_of_folder(path), is_map=False)
     if named is None and path.suffix.lower() in PICTURES:
         _refuse_picture_of_map(path)

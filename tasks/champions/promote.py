@@ -109,7 +109,7 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
     if not champions:
         raise RunError(f"No champion{_of(memory)} has a previous one to roll back to.")
     last = max(champion.retraining for champion in champions)
-    changes = []
+    found: list[tuple[Version, Version]] = []
     for champion in champions:
         if memory is None and champion.retraining != last:
             continue
@@ -124,8 +124,11 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
         if before is None:
             raise RunError(
                 f"{champion.name}: version {champion.tag('previous')}, the previous champion, is no longer "
-                f"in the registry; version {champion.number} stays."
+                f"in the registry; nothing was changed."
             )
+        found.append((champion, before))
+    changes = []
+    for champion, before in found:
         registry.set_tags(champion, {"verdict": ROLLED_BACK})
         # last: if the command is killed before this line, repeating it still goes back only one version
         registry.set_alias(before)

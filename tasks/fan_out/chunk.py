@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import open_data_folder
-from storage.places.files import write_json
+from storage.places.files import read_json, write_json
+from storage.places.mirror import is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.keys import key_of
@@ -98,5 +99,7 @@ def run_folder(data: str, settings: RunSettings) -> RunFolder:
 
 
 def keep_settings(data: str, settings: RunSettings) -> None:
-    """Write the settings of a run into its folder."""
-    write_json(run_folder(data, settings).settings, json.loads(settings.to_json()))
+    """Write the settings of a run into its folder, unless they are there: runs are dated by this file."""
+    path, values = run_folder(data, settings).settings, json.loads(settings.to_json())
+    if not is_there(path) or read_json(path) != values:
+        write_json(path, values)

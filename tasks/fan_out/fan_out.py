@@ -93,8 +93,7 @@ def task_runner() -> Any:
 def _connected(address: str) -> Iterator[str]:
     _check_encryption(address)
     try:
-        with Client(address, timeout=CONNECT_SECONDS, set_as_default=False):
-            yield address
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
         raise RuntimeError(
             redacted(
@@ -102,6 +101,8 @@ def _connected(address: str) -> Iterator[str]:
                 "machine the certificate that it asks for (docs/runbook.md)."
             )
         ) from error
+    with client:
+        yield address
 
 
 def _check_encryption(address: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -42,6 +43,7 @@ GatherFlow = Callable[[GatherRequest], list[Gathered]]
 _LOG = logging.getLogger(__name__)
 FEW_PLANS: Final = 50  # gathering so many here takes hardly more time than starting a server and workers
 HEADINGS: Final = ("source", "questions asked", "questions answered", "plans stored", "mean driving s")
+UNFIT: Final = re.compile(r"[^\w\-. /]")  # in names of MLflow's metrics
 FIELDS: Final = ("source", "questions", "answered", "plans", "driving_s")
 
 
@@ -152,9 +154,11 @@ def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
         for each in zip(*((each.questions, each.answered, each.plans) for each in counts), strict=True)
     )
     driving = sum(each.answered * (each.driving_s or 0.0) for each in counts) / answered
-    own = {f"plans_{each.name}": float(each.plans) for each in counts}
+    own: Counter[str] = Counter()
+    for each in counts:  # of equal names, in a form that MLflow takes
+        own["plans_" + UNFIT.sub("_", each.name)] += each.plans
     totals = {"questions": questions, "plans": plans, "answered": answered / questions}
-    return {**totals, "driving_seconds": driving, **own}
+    return {**totals, "driving_seconds": driving, **{name: float(plans) for name, plans in own.items()}}
 
 
 def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> list[SourceCounts]:
@@ -167,9 +171,9 @@ def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> 
                 results = flow(request)
         kept, tried = _kept(request, results)
         if not kept:
-            raise RunError(
-                f"None of the {tried.total()} questions was answered; give easier or other sources."
-            )
+            none = f"None of the {tried.total()} questions was answered"
+            none = none if tried else "There is no room for a question"
+            raise RunError(f"{none}; give easier or other sources.")
         counts = _counted(request, kept, tried)
         _save(request, kept, counts)
         remove_parts(request.out)

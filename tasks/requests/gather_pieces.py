@@ -130,7 +130,10 @@ def gather_pieces(
     longest = max(source.most for source in read_sources(request)) * len(request.sources)
     results: list[Gathered] = []
     answered = asked = 0
-    while answered < request.plans and asked < GIVE_UP * request.plans and len(results) * PIECE < longest:
+    most = GIVE_UP * request.plans
+    while answered < request.plans and asked < most and len(results) * PIECE < longest:
+        if asked == 0 and len(results) * PIECE >= most:
+            break  # there is no room for a question
         missing = -(-(request.plans - answered) // PIECE)
         found = do([GatherPiece(request, len(results) + i) for i in range(missing)])
         answered += sum(len(set(each.rows)) for each in found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import shutil
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -148,6 +149,9 @@ def import_worlds(
 def _write(out: Path, imported_parts: Mapping[Part, Imported], vehicle: Vehicle) -> None:
     if out.suffix == "":
         with whole_folder(out) as folder:
+            for other in set(PARTS) - set(imported_parts):  # of an earlier import
+                if (out / other).is_dir():
+                    shutil.copytree(out / other, folder / other)
             for part, imported in imported_parts.items():
                 (folder / part).mkdir()
                 write_problems(folder / part / PROBLEMS_FILE, imported.problems, vehicle)

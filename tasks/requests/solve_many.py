@@ -143,7 +143,7 @@ def solve_many(
             repeated = _repeated_id(parts)
             if repeated is not None:
                 raise StorageError(repeated)
-            if out.exists():
+            if out.exists() and not shard_is_done(out, key):
                 _LOG.info("%s held rows of other problems or options; these take their place.", out)
             join_attempts(out, [part.shard for part in parts], key)
             remove_parts(out)

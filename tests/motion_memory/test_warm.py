@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from motion_memory import load
 from planners.memory.library.plan_library import gathered_library
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import families_of, family
-from planners.world.vehicles.vehicle import VEHICLES
+from planners.world.vehicles.vehicle import CAR, VEHICLES, About
 from storage.archives.libraries import save_library
 from tasks.attempts.compile_assists import EMPTY
 
@@ -40,3 +41,12 @@ def test_no_question_needs_a_kernel_that_loading_did_not(name: str, tmp_path: Pa
     first, *rest = said.stdout.splitlines()
     assert int(first.split()[0]) > 0
     assert rest == []
+
+
+def test_a_library_of_a_vehicle_that_cannot_drive_backwards_is_loaded_too(tmp_path: Path) -> None:
+    vehicle = CAR._replace(min_speed=0.0, about=About(b"forwards"))
+    plan = solve(EMPTY, "lattice", vehicle=vehicle).plan
+    assert plan is not None
+    save_library(tmp_path / "library", gathered_library("some", vehicle, [("empty", plan)]))
+    answer = load(tmp_path / "library").plan(EMPTY)
+    assert answer.plan is not None

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
-from flows.cli.main import app, call
+from flows.cli.main import _interrupt, app, call
 from flows.cli.run_options import worker_count
 
 COMMANDS = (
@@ -157,3 +159,22 @@ def test_the_version_names_what_a_report_of_a_fault_needs(capsys: pytest.Capture
 def test_completion_is_installed_where_it_is_asked_for(tmp_path: Path) -> None:
     assert call(["--install-completion", "--shell", "bash", "--output", str(tmp_path / "completion")]) == 0
     assert "motion-memory" in (tmp_path / "completion").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "--preset", "smoke"], "Repeat the command to continue"),
+        (["--quiet", "run"], "Repeat the command to continue"),
+        (["--quiet", "plan", "a.json"], "Nothing was kept"),
+        (["--json", "serve"], "Stopped."),
+    ],
+)
+def test_ctrl_c_says_what_becomes_of_the_command_wherever_its_options_stand(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    monkeypatch.setattr("flows.cli.main.threading.Timer", Mock())  # which would force an exit
+    monkeypatch.setattr("sys.argv", ["motion-memory", *words])
+    with pytest.raises(KeyboardInterrupt):
+        _interrupt(signal.SIGINT, None)
+    assert told in capsys.readouterr().err

@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.world.problem import BOUNDS, Arrival, Problem, obstacles_of
+from planners.world.alignment import to_canonical
+from planners.world.problem import BOUNDS, Arrival, Problem, obstacles_of, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, VEHICLES, About, state_names
 from storage.exchange.problem_files import FIELDS, FORMATS
 from storage.exchange.problems import fields_of, problem_of, read_problems, write_problems
@@ -198,3 +199,11 @@ def test_degrees_are_warned_of_once_and_taken_as_the_radians_that_they_may_be(
     told = [record.getMessage() for record in caplog.records]
     assert len(told) == (hinted is not None)
     assert hinted is None or re.search(rf"id 'one'\): {hinted}", told[0])
+
+
+def test_who_cannot_stop_asks_what_memories_answer_unless_it_says_how_fast_it_is() -> None:
+    vehicle = CAR._replace(min_speed=1.0, about=About(b"never-stops"))
+    asked = to_canonical(problem_of(GOOD, "q", vehicle))[0]
+    assert asked.start_motion == ()
+    assert start_state(asked, vehicle)[3] == 1.0
+    assert problem_of({**GOOD, "start_steering": 0.1}, "q", vehicle).start_motion == (1.0, 0.1)

@@ -199,3 +199,13 @@ def test_where_there_is_no_data_nothing_is_made(tmp_path: Path) -> None:
         with pytest.raises(RunError, match="is not a data folder"):
             change(tmp_path / "nowhere", None)
     assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_rollback_of_which_one_part_cannot_be_done_changes_nothing(registered: Registered) -> None:
+    registry, other = registered.registry, "motion-memory-curves"
+    for name, previous in ((NAME, "1"), (other, "99")):
+        registry.set_alias(registered.version("one", name, verdict=FIRST))
+        registry.set_alias(registered.version("two", name, retraining=1, previous=previous))
+    with pytest.raises(RunError, match="version 99"):
+        roll_back(registered.data, None)
+    assert registered.champion == 2

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import MagicMock, Mock
 
 import dask
 import pytest
@@ -123,3 +123,11 @@ def test_a_result_that_is_lost_on_its_way_counts_as_not_done(
     future = Mock(status=status)
     future.result.side_effect = fetched
     assert (fan_out._state(future) is fan_out.GONE) == lost
+
+
+def test_what_goes_wrong_with_a_scheduler_at_hand_is_not_blamed_on_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tasks.fan_out.fan_out.Client", MagicMock())
+    with pytest.raises(UsageError, match="too few"), fan_out.cluster(scheduler="tcp://127.0.0.1:1"):
+        raise UsageError("too few")

@@ -291,3 +291,16 @@ def test_a_misspelt_family_is_told_with_the_nearest_name(
 ) -> None:
     assert call(["gather", "perpendiculr", "--out", str(tmp_path / "library")]) == 1
     assert "nearest is 'perpendicular'" in capsys.readouterr().err
+
+
+def test_where_there_is_no_room_for_any_question_gathering_ends(tmp_path: Path) -> None:
+    request = pieces.GatherRequest(("random",), tmp_path, 3, 0.0, "standard", ImportSettings())
+    done = pieces.gather_pieces(request, lambda given: [pieces.Gathered([], []) for _ in given])
+    assert len(done) * pieces.PIECE >= pieces.GIVE_UP * request.plans
+
+
+def test_sources_of_one_name_are_counted_together_in_a_form_that_mlflow_takes() -> None:
+    counts = [
+        gather.SourceCounts(name, 5, 4, plans, 9.0) for name, plans in (("a(1).map", 3), ("a(1).map", 4))
+    ]
+    assert gather.gathered_metrics(counts)["plans_a_1_.map"] == 7.0

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from flows.cli.main import call
+from storage.errors import StorageError
 from storage.exchange.problems import read_problems, write_problems
 from storage.tables.imported_problems import read_imported
+from storage.worlds.sources import source_at
 from tasks.inputs.problem_sources import source_key, source_of
 from tasks.settings.presets import for_preset
 from tasks.stages.read_worlds import READ_WORLDS, WorldsRead
@@ -196,3 +198,17 @@ def test_a_run_collects_and_tests_on_a_map_or_on_what_was_cut_from_it(
     assert np.array_equal(stored[4].obstacles.vertices, source.problem("collect", 4).obstacles.vertices)
     assert all(problem.class_name == "town" for problem in stored)
     assert source_key(settings, "town") == source_key(settings, "town")
+
+
+def test_importing_one_part_again_leaves_the_other(town: Path, tmp_path: Path) -> None:
+    asked = ["import-worlds", str(town), "--problems", "3", "--out", str(tmp_path / "worlds")]
+    assert call([*asked, "--part", "both"]) == 0
+    before = (tmp_path / "worlds" / "test" / "problems.parquet").read_bytes()
+    assert call([*asked, "--part", "train", "--seed", "2"]) == 0
+    assert (tmp_path / "worlds" / "test" / "problems.parquet").read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["ros", "moving-ai"])
+def test_a_folder_is_no_map(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StorageError, match="name one map in it"):
+        source_at(tmp_path, name)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.run import run
+from flows.run import run as run_flow
 from tasks.settings.errors import UsageError
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.presets import for_preset
@@ -45,7 +45,7 @@ def test_what_is_measured_beside_a_run_does_not_change_its_name() -> None:
 
 def test_a_run_with_too_few_is_refused_before_it_begins(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"4 experiences: give 5 or more"):
-        run.fn(for_preset("smoke", experiences=4, continual="all"), str(tmp_path))
+        run_flow.fn(for_preset("smoke", experiences=4, continual="all"), str(tmp_path))
     assert not list(tmp_path.rglob("*.parquet"))
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from planners.world.workspace import Workspace
 from storage.exchange.problems import write_problems
 from storage.tables.experiences import read_experiences
 from storage.tables.imported_problems import write_imported
-from tasks.fan_out.chunk import run_folder
+from tasks.fan_out.chunk import keep_settings, run_folder
 from tasks.inputs.problem_sources import source_of
 from tasks.inputs.shortfalls import as_collected, shortfalls
 from tasks.settings.errors import RunError
@@ -165,3 +166,13 @@ def test_without_any_class_there_is_no_run(tmp_path: Path) -> None:
     assert [each.unusable is None for each in results.values()] == [False]
     with pytest.raises(RunError, match="none has only 0 of 4"):
         collect(str(tmp_path / "data"), settings)
+
+
+def test_repeating_a_run_does_not_date_it_anew(tmp_path: Path) -> None:
+    place = run_folder(str(tmp_path), PLAIN).settings
+    keep_settings(str(tmp_path), PLAIN)
+    os.utime(place, (1.0, 1.0))
+    keep_settings(str(tmp_path), PLAIN)
+    assert place.stat().st_mtime == 1.0
+    keep_settings(str(tmp_path), replace(PLAIN, left_out=("random",)))
+    assert place.stat().st_mtime > 1.0
