@@ -195,8 +195,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return squeezed is not None
 
     def is_enclosed() -> bool:
-        """Whether squeezing was in vain, too, and no known ending may lead to the goal."""
-        if manoeuvring is None or may_squeeze or not (joining is None or joining.is_over):
+        """Whether squeezing was in vain, too, and no known ending may lead to the goal.
+
+        Who looks for something better knows a drive there.
+        """
+        if improving or manoeuvring is None or may_squeeze or not (joining is None or joining.is_over):
             return False
         return manoeuvring.is_enclosed
 

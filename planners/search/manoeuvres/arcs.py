@@ -12,7 +12,7 @@ from planners.world.vehicles.dynamics import State, step, store, top_speed, turn
 from planners.world.vehicles.vehicle import Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
-LEAST: Final = 0.001  # of it: strides of those who hardly drive in a gear
+LEAST: Final = 0.001  # of it: the stride of a vehicle that hardly moves in a step
 COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
 FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
 
@@ -21,9 +21,8 @@ FINE: Final = 5  # so many looks where the way is narrow, each with a smaller ma
 def stride_of(gear: float, vehicle: Vehicle) -> float:
     """The metres from one look to the next: no more than are driven in a step at full speed.
 
-    But for a vehicle that hardly moves in a step, at which nobody looks more often than every ``LEAST``. One
-    that cannot stand drives whole steps at its least speed. Vehicles may be those that drive out of a goal.
-    It is 0 if they do not drive in this gear.
+    It is at least ``LEAST`` of the length, and 0 if the vehicle cannot drive in this gear. A vehicle that
+    cannot stand drives whole steps at its least speed. Vehicles may be those that drive out of a goal.
     """
     least = max(vehicle.min_speed, -vehicle.max_speed)
     top = top_speed(gear, 0.0, vehicle)

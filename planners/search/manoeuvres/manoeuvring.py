@@ -154,7 +154,7 @@ class Manoeuvring:
     @property
     def is_enclosed(self) -> bool:
         """Whether all drives out of the goal end near it, with nothing left to open at any level."""
-        if not self.is_over or self._found_some:
+        if not self.is_over or self.kept:
             return False
         return is_closed(self._tree, self._goal, self._query.problem.bounds, self._vehicle)
 
@@ -227,7 +227,7 @@ class Manoeuvring:
             level_ends = self._expansions - self._spent
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:
-                self._is_mended, self._found_some = self._is_mended and bool(self.kept), True
+                self._is_mended = self._is_mended and bool(self.kept)
                 return True
             is_over = used in (0, level_ends)
             if (is_over or self.expansions >= self._mend_at) and self._mends(until):
@@ -284,7 +284,6 @@ class Manoeuvring:
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
-        self._found_some = False  # a drive, maybe one that costs more than is asked for
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._checks_before = int(self._tree.counts[CHECKS] + self._other.counts[CHECKS])
         self._begin()
