@@ -116,11 +116,14 @@ def shown_states(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
     return shown
 
 
-def travel_arrows(plan: Plan, vehicle: Vehicle = CAR, apart: float | None = None) -> Floats:
+def travel_arrows(
+    plan: Plan, vehicle: Vehicle = CAR, apart: float | None = None, scale: float = 1.0
+) -> Floats:
     """Where arrows along ``plan`` stand, ``[n, 5]``: x, y, a vector of length 1 along the travel, the gear.
 
     They are at most ``apart`` m from each other, by default as far as the footprints of ``vehicle``, and
-    between these. A stretch in one gear has one in its middle even if it is as short as half of the body.
+    between these. A stretch in one gear has one in its middle even if it is as short as half of the body, of
+    which a metre is ``scale`` metres of the plan.
     """
     apart = apart or footprint_spacing_m(vehicle)
     gears, ends = gears_of(plan, vehicle), [0, *cusps_of(plan, vehicle).tolist(), len(plan.states) - 1]
@@ -130,7 +133,7 @@ def travel_arrows(plan: Plan, vehicle: Vehicle = CAR, apart: float | None = None
         steps = np.diff(way, axis=0)
         lengths = np.hypot(*steps.T)
         driven = np.cumsum(lengths)
-        if len(driven) == 0 or driven[-1] < 0.5 * (vehicle.front + vehicle.rear):
+        if len(driven) == 0 or driven[-1] < 0.5 * scale * (vehicle.front + vehicle.rear):
             continue
         count = 1 + int(driven[-1] / apart)
         rows = np.searchsorted(driven, driven[-1] * (np.arange(count) + 0.5) / count)

@@ -139,7 +139,9 @@ def _command(command: Callable[..., int | None]) -> Flow[..., None]:
     types = get_type_hints(command)
     own: list[inspect.Parameter] = []
     groups: dict[str, list[inspect.Parameter]] = {}  # options that the command takes as one object
-    for each in inspect.signature(command).parameters.values():
+    parameters = inspect.signature(command).parameters.values()
+    only_by_place = [each.name for each in parameters if each.kind is each.POSITIONAL_ONLY]
+    for each in parameters:
         if hasattr(types[each.name], "__dataclass_fields__"):
             groups[each.name] = _options_of(types[each.name])
         else:
@@ -151,7 +153,8 @@ def _command(command: Callable[..., int | None]) -> Flow[..., None]:
             name: types[name](**{each.name: given.pop(each.name) for each in options})
             for name, options in groups.items()
         }
-        command(**given, **values)
+        first = [given.pop(name) for name in only_by_place]
+        command(*first, **given, **values)
 
     flat = [*own, *(each for options in groups.values() for each in options)]
     told = _told(command, *(types[name] for name in groups))

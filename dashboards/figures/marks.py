@@ -23,12 +23,13 @@ def draw_travel_arrows(
     colours: Mapping[int, str],
     apart: float | None = None,
     size: float = 11.0,
+    scale: float = 1.0,
 ) -> None:
     """Draw heads of arrows where ``vehicle`` travels along ``plan``, in the colour of the gear, 1 or -1.
 
-    ``apart`` is that of ``travel_arrows``, ``size`` is that of the heads, in points.
+    ``apart`` and ``scale`` are those of ``travel_arrows``, ``size`` is that of the heads, in points.
     """
-    for x, y, ahead, aside, gear in travel_arrows(plan, vehicle, apart).tolist():
+    for x, y, ahead, aside, gear in travel_arrows(plan, vehicle, apart, scale).tolist():
         style = {"arrowstyle": "-|>", "color": colours[int(gear)], "linewidth": 0.0, "mutation_scale": size}
         tip = (x + _TIP_M * ahead, y + _TIP_M * aside)
         axes.annotate("", tip, (x, y), arrowprops=style | {"shrinkA": 0.0, "shrinkB": 0.0}, zorder=6.6)

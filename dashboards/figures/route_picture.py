@@ -117,7 +117,7 @@ def _draw_legs(
         axes.add_collection(LineCollection(list(steps), color=BACKWARDS, linewidth=2.6, zorder=6))
         backs = backs or len(steps) > 0
         colours = {1: COLOURS[leg.source], -1: BACKWARDS}
-        draw_travel_arrows(axes, way, vehicle, colours, _APART * longest, 17.0)
+        draw_travel_arrows(axes, way, vehicle, colours, _APART * longest, 17.0, scale)
         sources.append(leg.source)
     brakes = any(leg.driving < len(leg.controls) for leg, _ in driven)
     handles: list[Line2D | Patch] = [

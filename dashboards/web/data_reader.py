@@ -29,7 +29,7 @@ from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_run
 from storage.places.files import read_json, read_text
-from storage.places.mirror import folders_in
+from storage.places.mirror import PARTIAL, folders_in
 from storage.places.run_folder import NAME, RunFolder, worlds_name
 from storage.tables.attempts import readable_attempts
 from storage.tables.imported_problems import read_imported
@@ -206,8 +206,13 @@ def _has_attempts(run: RunFolder) -> bool:
 def stamp_of(path: Path) -> Stamp:
     """What changes when the file at ``path``, or any file in the folder there, is written again."""
     paths = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
-    stats = [(file, file.stat()) for file in paths]
-    return tuple((str(file), stat.st_mtime_ns, stat.st_size) for file, stat in stats)
+    stamps = []
+    for file in paths:
+        if file.suffix != PARTIAL:
+            with suppress(FileNotFoundError):  # it has just been renamed or merged
+                stat = file.stat()
+                stamps.append((str(file), stat.st_mtime_ns, stat.st_size))
+    return tuple(stamps)
 
 
 def _by_id(path: Path) -> dict[str, Problem]:

@@ -97,9 +97,9 @@ def gather(
     from tasks.registry.settled_vehicle import settled_vehicle
     from tasks.requests import gather as task
     from tasks.requests.import_worlds import import_settings
+    from tasks.requests.question_sources import first_of_problems
 
-    file = next((Path(each) for each in sources if Path(each).is_file()), None)
-    driver = settled_vehicle(vehicle, file)
+    driver = settled_vehicle(vehicle, first_of_problems(sources))
     settings = import_settings(driver, seed, **asdict(reading))
     counts = task.gather(
         sources, out, plans, poses, difficulty, settings, worker_count(workers), _gather_pieces

@@ -57,9 +57,11 @@ def question_in(
                 return replace(begun, goal=(x, y))
             continue
         parked = np.zeros((1, state_size(vehicle)))
-        parked[0, :3] = x, y, heading
+        least = max(vehicle.min_speed, 0.0)
+        parked[0, :4] = x, y, heading, least
         if count_free_prefix(parked, vehicle, scene):
-            arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0)
+            most = vehicle.max_speed if least > 0.0 else 0.0  # at rest, if it can be
+            arrival = Arrival(heading, POSE_TOLERANCE, least, most)
             return replace(begun, goal=(x, y), goal_radius=POSE_RADIUS, arrival=arrival)
     return None
 

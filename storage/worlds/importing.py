@@ -131,14 +131,18 @@ def _of_map(source: Source, part: Part, settings: ImportSettings, progress: Prog
             )  # fmt: skip
             return Imported([cut.problem for cut in cuts], [], cuts)
         cuts, skipped = [], []
-        ends = read_scenarios(source.path, world)[: settings.count]
+        ends = read_scenarios(source.path, world)
         scenarios = cut_scenarios(world, surroundings, part, ends, settings.vehicle)
         for number, cut in enumerate(scenarios, start=1):
             progress(number, len(ends))
             if isinstance(cut, Cut):
                 cuts.append(cut)
+            elif settings.strict:
+                raise StorageError(sentence(f"{source.path} scenario {number}", cut))
             else:
                 skipped.append((f"{source.path} scenario {number}", cut))
+            if len(cuts) == settings.count:
+                break
         return Imported([cut.problem for cut in cuts], skipped, cuts)
     except ValueError as error:
         raise StorageError(sentence(source.path, error)) from None

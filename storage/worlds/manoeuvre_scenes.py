@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,7 +26,7 @@ _BRACKETS: Final = 4_000  # of a dynobench environment in YAML
 Fields = dict[str, Any]
 
 
-def tpcap_cases(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]]:
+def tpcap_cases(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields | str]]:
     """Cases of the Trajectory Planning Competition of Automated Parking: one in a ``.csv``, many in JSON.
 
     A ``.csv`` is one line: start and goal pose, the number of obstacles, of the corners of each, and these.
@@ -34,11 +34,29 @@ def tpcap_cases(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]]:
     ValueError or StorageError with what is wrong with the file.
     """
     check_file(file, LARGEST_FILE, "is it a case of TPCAP?")
-    for case in [_case_of_line(file)] if file.suffix == ".csv" else _listed(_object(file), "cases"):
+
+    def read(case: Mapping[str, Any]) -> Fields:
         start, goal = _numbers(case, "start", 3), _numbers(case, "goal", 3)
         ends = list(zip(start[:2], goal[:2], strict=True))
         bounds = [min(end) - AROUND_M for end in ends] + [max(end) + AROUND_M for end in ends]
-        yield _id(case), _pose_to_pose(start, goal, bounds, case.get("obstacles"))
+        return _pose_to_pose(start, goal, bounds, case.get("obstacles"))
+
+    cases = [_case_of_line(file)] if file.suffix == ".csv" else _listed(_object(file), "cases")
+    yield from _each(cases, read)
+
+
+def _each(
+    cases: Sequence[Mapping[str, Any]], read: Callable[[Mapping[str, Any]], Fields | str]
+) -> Iterator[tuple[str, Fields | str]]:
+    """The id of each case with its fields, or with why it cannot be read."""
+    for number, case in enumerate(cases, start=1):
+        try:
+            identity, fields = _id(case), read(case)
+        except ValueError as error:
+            if len(cases) == 1:
+                raise
+            identity, fields = f"number {number}", str(error)
+        yield identity, fields
 
 
 def _pose_to_pose(start: list[float], goal: list[float], bounds: list[float], obstacles: object) -> Fields:
@@ -71,7 +89,7 @@ def _case_of_line(file: Path) -> Fields:
     return {"id": file.stem, "start": start, "goal": goal, "obstacles": obstacles}
 
 
-def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]]:
+def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields | str]]:
     """Problems between poses in Bench-MR's polygon scenes, packed as JSON, for any ``vehicle``.
 
     The file has ``environments``, lists of polygons by name, and ``problems``, each with ``id``,
@@ -84,13 +102,16 @@ def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]
     if not isinstance(environments, Mapping):
         raise ValueError("has no environments (polygons by name of scene); is it from Bench-MR?")
     reach = vehicle.scale * math.hypot(max(vehicle.front, vehicle.rear), 0.5 * vehicle.width)
-    for problem in _listed(fields, "problems"):
+
+    def read(problem: Mapping[str, Any]) -> Fields:
         name = text_of(problem.get("environment"), "environment")
         if name not in environments:
             raise ValueError(f"has no environment {short(name)}; it has {', '.join(environments)}")
         start, goal = _numbers(problem, "start", 3), _numbers(problem, "goal", 3)
         bounds = _widened(_corners(problem.get("bounds")), reach)
-        yield _id(problem), _pose_to_pose(start, goal, bounds, environments[name])
+        return _pose_to_pose(start, goal, bounds, environments[name])
+
+    yield from _each(_listed(fields, "problems"), read)
 
 
 def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields | str]]:
@@ -102,18 +123,19 @@ def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fiel
     StorageError.
     """
     check_file(file, LARGEST_FILE, "is it a problem of dynobench?")
-    problems = _listed(_object(file), "problems") if file.suffix == ".json" else [_in_yaml(file)]
-    for problem in problems:
+
+    def read(problem: Mapping[str, Any]) -> Fields | str:
         model = text_of(problem.get("model"), "model")
         wanted = f"dynobench-{model.replace('_', '-')}"
         if vehicle.about.name.decode() != wanted:
-            yield _id(problem), f"is for the model {model}; use it with a --vehicle named {wanted}"
-            continue
+            return f"is for the model {model}; use it with a --vehicle named {wanted}"
         fields: Fields = {"bounds": _widened(_corners(problem.get("bounds")), _inscribed(vehicle))}
         fields["obstacles"] = [_box(each) for each in _listed(problem, "obstacles")]
         size = 3 + (len(trailers_of(vehicle)) if vehicle.first_order else 2)
         fields |= _start(_numbers(problem, "start", size), vehicle)
-        yield _id(problem), fields | _goal(_numbers(problem, "goal", size), vehicle)
+        return fields | _goal(_numbers(problem, "goal", size), vehicle)
+
+    yield from _each(_listed(_object(file), "problems") if file.suffix == ".json" else [_in_yaml(file)], read)
 
 
 def _inscribed(vehicle: Vehicle) -> float:

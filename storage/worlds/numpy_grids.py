@@ -47,8 +47,10 @@ def read_grid(
 
 def grid_worlds(
     file: Path, identity: str, class_name: str, unknown_is_occupied: bool = True
-) -> Iterator[tuple[str, Problem]]:
+) -> Iterator[tuple[str, Problem | str]]:
     """The canonical problems of arrays ``[201, 201]`` or ``[n, 201, 201]``, and where each stands in them.
+
+    Of a world that cannot be read it is said why.
 
     Args:
         file: the file of the arrays.
@@ -68,8 +70,13 @@ def grid_worlds(
     number = 0
     for name, array in _arrays(file):
         for index, cells in enumerate(array.reshape(-1, PIXELS, PIXELS)):
-            occupied = _occupied(cells, unknown_is_occupied)
-            yield f"{name}[{index}]", problem_of_cells(occupied, f"{identity}-{number}", class_name)
+            where = f"{name}[{index}]"
+            try:
+                occupied = _occupied(cells, unknown_is_occupied)
+            except ValueError as error:
+                yield where, str(error)
+            else:
+                yield where, problem_of_cells(occupied, f"{identity}-{number}", class_name)
             number += 1
 
 

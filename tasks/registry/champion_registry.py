@@ -71,7 +71,10 @@ class Registry:
         """Remember where the registry is; nothing is opened or created yet."""
         self.uri = tracking_uri(data)
         self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
-        self._missing = not os.environ.get("MLFLOW_TRACKING_URI") and not data.mlflow_database.is_file()
+
+    @property
+    def _missing(self) -> bool:
+        return self._own is not None and not self._own.mlflow_database.is_file()
 
     def names(self) -> list[str]:
         """The names of all registered memories, sorted."""
@@ -111,7 +114,6 @@ class Registry:
             tags: written to the version, whether it is new or not.
             description: likewise.
         """
-        self._missing = False
         version = next((each for each in self.versions(name) if each.tag("key") == key), None)
         with self._client() as client, environment(MLFLOW_TRACKING_URI=self.uri):
             if not client.search_registered_models(f"name = '{name}'"):

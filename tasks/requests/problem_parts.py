@@ -33,7 +33,7 @@ KEEP_SECONDS: Final = 5.0  # of work on a part that may be lost if a worker is k
 PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
 MOST_IN_ONE_FOLDER: Final = 10_000  # plans; for more problems each part writes its plans into its own folder
 COLLECT_EVERY: Final = 50  # problems from one garbage collection to the next
-LONGEST_FILE_NAME: Final = 200  # characters of an id that names a file; file systems allow 255 bytes
+LONGEST_FILE_NAME: Final = 200  # bytes of an id that names a file; file systems allow 255 bytes
 
 
 @dataclass(frozen=True)
@@ -224,6 +224,6 @@ def plans_are_there(part: FilePart, identities: Sequence[str]) -> bool:
 def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:
     """The file of a problem's plan, named by its id if that is a safe file name, else by its number."""
     is_plain = all(letter.isalnum() or letter in "-_.~" for letter in identity)
-    is_safe = is_plain and not identity.startswith(".") and 0 < len(identity) <= LONGEST_FILE_NAME
+    is_safe = is_plain and not identity.startswith(".") and 0 < len(identity.encode()) <= LONGEST_FILE_NAME
     name = identity if is_safe else f"problem+{number}"
     return folder / (f"{part.index:06d}" if part.own_folder else "") / f"{name}.json"

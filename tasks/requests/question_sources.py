@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from planners.world.classes.problem_classes import CLASSES, ProblemClass
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.errors import StorageError
+from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import read_problems
 from storage.fields import nearest
 from storage.worlds.importing import ImportSettings, import_part
@@ -35,6 +36,12 @@ class QuestionSource:
 def is_drawn(name: str) -> bool:
     """Whether the name is that of a class or a family, whatever files and folders there are."""
     return name in (*CLASSES, *FAMILIES)
+
+
+def first_of_problems(sources: Sequence[str]) -> Path | None:
+    """The first of some sources that is a file of problems, which may state a vehicle; None if none is."""
+    files = (Path(each) for each in sources if not is_drawn(each))
+    return next((each for each in files if each.suffix in FORMATS and each.is_file()), None)
 
 
 def drawn_source(name: str, difficulty: str, vehicle: Vehicle) -> ProblemClass | Family:

@@ -241,7 +241,7 @@ def _give_up(server: LocalServer, reason: str) -> None:
     """End this process; otherwise it would wait minutes for the server."""
     _LOG.error(
         "motion-memory: The local Prefect server %s; see %s. Finished work is kept; repeat the command to "
-        "from here.",
+        "go on from here.",
         reason,
         server.folder / LOG,
     )

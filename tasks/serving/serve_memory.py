@@ -82,7 +82,7 @@ def sample_request(memory: Memory | PlanLibrary) -> bytes:
     scale = memory.scales[0]
     notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]
     problem = {
-        "start": [0.0, 0.0, math.pi / 4 + 0.3],
+        "start": [0.0, 0.0, math.pi / 4 + 0.05],  # room for trailers behind
         "goal": [50.5 * scale, 49.5 * scale],
         "goal_radius": 2.0 * scale,
         "bounds": [scale * bound for bound in (-7.0, -7.0, 57.0, 57.0)],

@@ -158,6 +158,8 @@ def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -
         vehicle: the vehicle's name.
         model: MLflow's description of the model, which this fills.
     """
+    driven = said_vehicle(vehicle)
+    example = problem_class("trap", vehicle=driven).draw(0, 0)
     with scratch_folder() as scratch:
         wheel = write_wheel(scratch)
         save_model(
@@ -166,9 +168,7 @@ def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -
             artifacts={ARTIFACT: str(archive)},
             model_config={"vehicle": vehicle},
             signature=SIGNATURE,
-            input_example=pd.DataFrame(
-                {"problem": [json.dumps(fields_of(problem_class("trap").draw(0, 0)))]}
-            ),
+            input_example=pd.DataFrame({"problem": [json.dumps(fields_of(example, driven))]}),
             code_paths=[str(wheel)],
             pip_requirements=[f"{WHEELS}/{wheel.name}", f"mlflow=={mlflow.__version__}"],
             mlflow_model=model,

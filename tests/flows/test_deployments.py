@@ -148,3 +148,22 @@ def test_what_a_schedule_keeps_is_accepted_by_the_flow_and_the_same_settings() -
     settings = for_preset("smoke", classes=["trap"], experiences=4)
     given = {"settings": as_parameter(settings), "data": "data", "approve": True}
     assert deployments.retrain_flow.validate_parameters(given)["settings"] == settings
+
+
+@pytest.mark.parametrize(("name", "given"), [("gather", {"sources": ["random"]}), ("adapt", {"memory": "m"})])
+def test_commands_that_name_their_input_by_its_place_run_as_deployed(
+    monkeypatch: pytest.MonkeyPatch, name: str, given: dict[str, Any]
+) -> None:
+    asked = []
+
+    def refused(*arguments: Any, **_: Any) -> None:
+        asked.append(arguments)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tasks.registry.settled_vehicle.settled_vehicle", refused)
+    monkeypatch.setattr(f"tasks.requests.{name}.{name}", refused)
+    flow = getattr(deployments, name)
+    further = {"out": "library", "vehicle": "car"}
+    with pytest.raises(KeyboardInterrupt):
+        flow.fn(**flow.validate_parameters(given | further))
+    assert len(asked) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any, Final, NamedTuple
 
@@ -256,7 +257,10 @@ def _run_after_run(measured: list[MeasuredRun], configuration: str) -> Iterator[
 def _learned(data: DataReader) -> Iterator[dict[str, Any]]:
     """What was learned from solving: files and the newest change, by vehicle."""
     for folder in data.folder.gained_folders():
-        times = [shard.stat().st_mtime for shard in gained_shards(folder) if shard.is_file()]
+        times = []
+        for shard in gained_shards(folder):
+            with suppress(FileNotFoundError):  # it has just been merged
+                times.append(shard.stat().st_mtime)
         if times:
             newest = datetime.fromtimestamp(max(times), UTC)
             yield {"vehicle": folder.name, "files": len(times), "newest": f"{newest:%Y-%m-%d %H:%M} UTC"}

@@ -40,7 +40,8 @@ def list_readout(vectors: Floats32, biases: Floats32) -> InvertedLists:
     rows = _rows(vectors, biases)
     count = min(len(rows), int(4 * np.sqrt(len(rows))))  # scoring centres then costs as much as their lists
     rng = generator(0, "inverted-lists")
-    sample = rows[np.sort(rng.choice(len(rows), min(len(rows), SAMPLE * count), replace=False))]
+    finite = np.where(np.isfinite(rows), rows, np.float32(0.0))  # plans that are never ranked have none
+    sample = finite[np.sort(rng.choice(len(rows), min(len(rows), SAMPLE * count), replace=False))]
     centres = sample[rng.choice(len(sample), count, replace=False)]
     for _ in range(ROUNDS):
         nearest = _nearest(sample, centres)
@@ -49,7 +50,7 @@ def list_readout(vectors: Floats32, biases: Floats32) -> InvertedLists:
         np.add.at(sums, nearest, sample)
         centres = np.where(sizes[:, np.newaxis] > 0, sums / np.maximum(sizes, 1)[:, np.newaxis], centres)
         centres = centres.astype(np.float32)
-    nearest = _nearest(rows, centres)
+    nearest = _nearest(finite, centres)
     plans = np.argsort(nearest, kind="stable").astype(np.int32)
     starts = np.concatenate(([0], np.cumsum(np.bincount(nearest, minlength=count)))).astype(np.int32)
     return InvertedLists(centres, starts, plans, rows[plans])

@@ -33,3 +33,14 @@ def test_a_question_makes_sense_and_is_always_the_same(vehicle: Vehicle, seed: i
 def test_who_cannot_brake_is_asked_nothing() -> None:
     world = problem_class("random").draw(1, 0)
     assert question_in(world, 0, 1, CAR._replace(max_acceleration=1e-9)) is None
+
+
+def test_who_cannot_stop_is_asked_to_pass_its_poses() -> None:
+    vehicle = CAR._replace(min_speed=0.5)
+    worlds = problem_class("random", vehicle=vehicle)
+    asked = [question_in(worlds.draw(3, number), number, 3, vehicle, True) for number in range(6)]
+    arrivals = [each.arrival for each in asked if each is not None]
+    assert len(arrivals) > 3
+    for arrival in arrivals:
+        assert arrival is not None
+        assert (arrival.least_speed, arrival.most_speed) == (0.5, vehicle.max_speed)

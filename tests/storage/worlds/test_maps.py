@@ -141,3 +141,18 @@ def test_a_name_may_have_points(tmp_path: Path) -> None:
     named = source_at(tmp_path / "floor-v1.2.map").class_name
     assert named == world_class(tmp_path / "floor-v1.2.map") == "floor-v1-2"
     assert class_names({"classes": [], "worlds": [str(tmp_path / "floor-v1.2.map")]}) == [named]
+
+
+def test_a_number_of_problems_counts_those_that_are_cut_and_strict_settings_stop(tmp_path: Path) -> None:
+    write_map(tmp_path / "m.map", CELLS)
+    write_scenarios(tmp_path / "m.scen", "m.map", CELLS, 40)
+    source = source_at(tmp_path / "m.scen")
+    every = import_part(source, "train")
+    assert every.skipped
+    for count in (1, len(every.problems)):
+        assert (
+            import_part(source, "train", ImportSettings(count=count)).problems[-1].id
+            == every.problems[count - 1].id
+        )
+    with pytest.raises(StorageError, match="scenario"):
+        import_part(source, "train", ImportSettings(strict=True))

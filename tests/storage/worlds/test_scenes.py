@@ -106,3 +106,12 @@ def test_no_more_worlds_are_read_than_asked_for(tmp_path: Path) -> None:
     for number in range(8):
         write_scene(tmp_path / f"{number}.txt", [box(20, 20).tolist()])
     assert len(imported(tmp_path, count=2).problems) == 2
+
+
+def test_a_world_that_cannot_be_read_does_not_hide_those_after_it(tmp_path: Path) -> None:
+    worlds = np.zeros((4, PIXELS, PIXELS), np.uint8)
+    worlds[1, 5, 5] = 2
+    np.save(tmp_path / "worlds.npy", worlds)
+    train, test = (import_part(source_at(tmp_path / "worlds.npy"), part) for part in ("train", "test"))
+    assert (len(train.problems), len(test.problems), len(test.skipped)) == (2, 1, 1)
+    assert "holds 2" in test.skipped[0][1]

@@ -95,3 +95,13 @@ def test_lists_that_do_not_fit_are_refused(lists, part):
         plans = plans.astype(np.int64)
     with pytest.raises(ValueError, match="3000 plans"):
         lists_with(centres, starts, plans, *readout())
+
+
+def test_plans_that_are_never_ranked_do_not_hide_the_others():
+    vectors, biases = readout()
+    never = np.arange(5, PLANS, 500)
+    biases[never] = -np.inf
+    lists = list_readout(vectors, biases)
+    assert np.isfinite(lists.centres).all()
+    assert sorted(lists.plans.tolist()) == list(range(PLANS))
+    assert np.diff(lists.starts).max() < PLANS / 4
