@@ -62,8 +62,8 @@ def solve(
     of the lattice at every place from which the end of a stored plan leads to the pose.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
-    drives shortest, else search. A free plan that is a long detour is the answer only if a short search finds
-    no quicker one.
+    costs least to drive, else search. A free plan that is a long detour is the answer only if a short search
+    finds no quicker one.
     ``open``: the same, and where no plan is free, a search along the least blocked of the recalled plans
     helps the planner. ``repair``: the same, and the blocked segments of that plan may be planned anew before.
     ``published-open``: the paper's open box, where the search samples near the states of all recalled plans.
@@ -247,11 +247,12 @@ def improved(
 ) -> Attempt:
     """Improve an attempt's plan for some seconds, or look for a first one. Times and counts are added up."""
     workspace = workspace or Workspace()
-    problem = aimed_view(problem, vehicle, workspace).problem  # that of ``solve``
+    view = aimed_view(problem, vehicle, workspace)  # as ``solve`` does
     more = improve(
-        *(attempt.planner, problem, attempt.plan),
+        *(attempt.planner, view.problem, attempt.plan),
         seconds=seconds,
         seed=attempt.seed,
+        scene=view.scene,
         vehicle=vehicle,
         workspace=workspace,
         is_polished=attempt.polished,

@@ -85,7 +85,7 @@ def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
         (x1, y1), (x2, y2) = problem.goal, ahead
         marks.append(element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_="heading asked"))
     if tip is not None:
-        speed = tooltip(f"{problem.start_motion[0]:g} m/s at the start")
+        speed = tooltip(f"{problem.scale * problem.start_motion[0]:g} m/s at the start")
         marks.append(element("line", speed, x1=x, y1=y, x2=tip[0], y2=tip[1], class_="speed"))
     return marks
 

@@ -1,11 +1,11 @@
 """Chooses which of many solved problems to keep: greedily, those whose plans together save most driving.
 
-Recall hands out the free plan that drives shortest, so a set of plans is worth what that plan saves. This is
-counted in the candidates' own problems, each by the plans of the others: that a plan fits its own problem
-says nothing about it, and a plan that fits no other problem is kept last. Where no plan is free, a problem
-costs what its own plan takes and ``MISSED_S`` more. So both count: to be free in many problems, and to be
-quick. Once no plan saves driving any more, those that are free in most problems come first. A problem may
-have several candidates, plans of its own that compete; at most one of them is kept.
+Recall hands out the free plan that costs least to drive, so a set of plans is worth what that plan saves.
+This is counted in the candidates' own problems, each by the plans of the others: that a plan fits its own
+problem says nothing about it, and a plan that fits no other problem is kept last. Where no plan is free, a
+problem costs what its own plan takes and ``MISSED_S`` more. So both count: to be free in many problems, and
+to be quick. Once no plan saves driving any more, those that are free in most problems come first. A problem
+may have several candidates, plans of its own that compete; at most one of them is kept.
 
 A plan takes off only a share of what it could save, so that a new problem finds several good plans. The kept
 plans are in the order of the greedy choice, so the first of them are a good choice of fewer. (The savings are

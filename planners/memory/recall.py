@@ -9,7 +9,7 @@
 | exhaustive | blocked cells | all that may be free |
 | random | nobody | k picked blindly |
 
-By cells, the plans that are likely to be free are tried, the quickest first, and then some that may be free.
+By cells, the plans that are likely to be free are tried, the cheapest first, and then some that may be free.
 To check all others in vain would cost a planner that is soon done more than the few that are free would save.
 So where more than three quarters of the plans seem free, that many, the least blocked, are looked at first:
 if none of these is free, no other is tried.
@@ -97,7 +97,7 @@ def recall(
             return early
         spent = early.checks
     worth = likely = (
-        count  # how many of the ranked plans may be returned, and how many are tried by driving time
+        count  # how many of the ranked plans may be returned, and how many are tried by their costs
     )
     tries: Integers | None = None
     decisive = NO_PLANS

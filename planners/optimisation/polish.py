@@ -64,8 +64,8 @@ def polish(
         vehicle: what is driven.
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
-        iterations: of one pass at most, and of all further ones together, as long as they gain much; each
-            takes some 0.2 to 0.3 ms for a car. By default ``most_iterations``.
+        iterations: of the first pass at most, and as many again for all further ones, which go on while they
+            gain much; each takes some 0.2 to 0.3 ms for a car. By default ``most_iterations``.
         margin_m: how many metres more than it needs the plan keeps from obstacles, where there is room.
         seconds: when to end, some iterations late; then another machine may give another result.
 

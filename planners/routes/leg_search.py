@@ -93,7 +93,7 @@ class LegSearch:
 
     def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats) -> Stuck:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
-        place, tried = (float(nearest[0]), float(nearest[1])), max(self.attempts, 1)
+        place, tried = (float(nearest[0]), float(nearest[1])), self.attempts
         if self._is_enclosed:
             why = MEANINGS[Status.GOAL_ENCLOSED]
             return Stuck(ahead.stop.place, why, tried, is_enclosed=True)

@@ -56,7 +56,7 @@ class PathAhead:
         Args:
             paths: those over a map's cells.
             stop: where they lead. They end in the nearest free cell that is seen from it, of those that a
-                way leads to; if none is seen, in its own, where no way leads if that is not free.
+                way leads to; if none is seen, in the stop's own cell; if that is not free there is no way.
             scene: what is occupied on the map.
             start: ``[>= 2]`` from where the vehicle comes.
             briefly: whether a pose is never asked for as long as need be.

@@ -32,7 +32,7 @@ MEANINGS: Final = {
     Status.BUDGET_SPENT: "the search gave up, so there may be a plan or none",
     Status.TIME_SPENT: "its time was up, so there may be a plan or none",
     Status.START_BLOCKED: "at the start the vehicle meets an obstacle or the bounds",
-    Status.GOAL_BLOCKED: "no place in the goal is free",
+    Status.GOAL_BLOCKED: "the middle of the goal is not free, or there is no room in the goal pose",
     Status.INFEASIBLE: "it is certain that no drive leads there",
     Status.GOAL_ENCLOSED: "every drive out of the goal pose that was found ends near it",
 }  # of an attempt without a plan, for people

@@ -123,7 +123,7 @@ ATTEMPTS: Final = _schema(
         ("collision_checks", pa.int64()),
         ("expansions", pa.int64()),
         ("nodes", pa.int64()),
-        ("length_m", pa.float64()),  # null if there is no plan
+        ("length_m", pa.float64()),  # in real metres; null if there is no plan
         ("duration_s", pa.float64()),  # null if there is no plan
         ("seed", pa.int64()),
         ("run_id", pa.string()),

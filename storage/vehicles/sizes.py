@@ -53,7 +53,8 @@ def _check_folded(vehicle: Vehicle) -> None:
 
     shapes = [_shape(body) for body in (vehicle, *trailers)]
     angles = [np.linspace(-each.max_hitch, each.max_hitch, FOLDS).tolist() for each in trailers]
-    for hitches in itertools.product(*angles):
+    apart: set[tuple[int, int]] | None = None  # bodies that do not overlap while all are in line
+    for hitches in [(0.0,) * len(trailers), *itertools.product(*angles)]:
         x = y = heading = 0.0
         bodies = shapes[:1]
         for trailer, shape, hitch in zip(trailers, shapes[1:], hitches, strict=True):
@@ -62,14 +63,16 @@ def _check_folded(vehicle: Vehicle) -> None:
             y -= trailer.hitch_length * math.sin(heading)
             turned = affinity.rotate(shape, heading, origin=(0.0, 0.0), use_radians=True)
             bodies.append(affinity.translate(turned, x, y))
-        for one, other in itertools.combinations(range(len(bodies)), 2):
-            if other > one + 1 and bodies[one].intersects(bodies[other]):
-                names = [f"trailer {k}" if k else "a body in front" for k in (one, other)]
-                told = ", ".join(f"{hitch:.2f}" for hitch in hitches)
-                raise ValueError(
-                    f"has {names[0]} and {names[1]} that touch each other at hitch angles of {told} rad; "
-                    "give a smaller max_hitch, a longer hitch_length or shorter bodies"
-                )
+        pairs = [(one, other) for other in range(len(bodies)) for one in range(other - 1)]
+        meet = {pair for pair in pairs if bodies[pair[0]].intersects(bodies[pair[1]])}
+        apart = set(pairs) - meet if apart is None else apart
+        for one, other in sorted(meet & apart):
+            names = [f"trailer {k}" if k else "the vehicle in front" for k in (one, other)]
+            told = ", ".join(f"{hitch:.2f}" for hitch in hitches)
+            raise ValueError(
+                f"has {names[0]} and {names[1]} that touch each other at hitch angles of {told} rad; "
+                "give a smaller max_hitch, a longer hitch_length or shorter bodies"
+            )
 
 
 def scale_for(vehicle: Vehicle) -> float:

@@ -59,9 +59,8 @@ def shortfalls(data: str, settings: RunSettings) -> list[Shortfall]:
 
 def begin_collecting(data: str, settings: RunSettings) -> RunSettings:
     """Keep the settings of a run in its folder, and return them with all classes."""
-    settings = replace(settings, left_out=())
-    keep_settings(data, settings)
-    return settings
+    keep_settings(data, as_collected(data, settings))
+    return replace(settings, left_out=())
 
 
 def leave_out(data: str, settings: RunSettings) -> RunSettings:
@@ -85,8 +84,7 @@ def leave_out(data: str, settings: RunSettings) -> RunSettings:
         told = ". ".join(each.found for each in short)
         raise RunError(f"{told}. Ask for fewer experiences or easier problems.")
     settings = replace(settings, left_out=left_out)
-    if left_out:
-        keep_settings(data, settings)
+    keep_settings(data, settings)
     log_shortfalls(short)
     return settings
 

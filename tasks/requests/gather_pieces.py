@@ -131,9 +131,10 @@ def gather_pieces(
     results: list[Gathered] = []
     answered = asked = 0
     most = GIVE_UP * request.plans
-    while answered < request.plans and asked < most and len(results) * PIECE < longest:
-        if asked == 0 and len(results) * PIECE >= most:
-            break  # there is no room for a question
+    # while there is no room for a question, all that were drawn count
+    while (
+        answered < request.plans and (asked or len(results) * PIECE) < most and len(results) * PIECE < longest
+    ):
         missing = -(-(request.plans - answered) // PIECE)
         found = do([GatherPiece(request, len(results) + i) for i in range(missing)])
         answered += sum(len(set(each.rows)) for each in found)

@@ -150,7 +150,7 @@ def _write(out: Path, imported_parts: Mapping[Part, Imported], vehicle: Vehicle)
     if out.suffix == "":
         with whole_folder(out) as folder:
             for other in set(PARTS) - set(imported_parts):  # of an earlier import
-                if (out / other).is_dir():
+                if len(imported_parts) == 1 and (out / other).is_dir():
                     shutil.copytree(out / other, folder / other)
             for part, imported in imported_parts.items():
                 (folder / part).mkdir()

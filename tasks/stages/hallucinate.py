@@ -15,7 +15,7 @@ from planners.memory.hallucination.no_plan import NeverBlockedError, no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans
-from planners.world.arrays import Bounds, Integers
+from planners.world.arrays import Integers
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from storage.archives.hallucinators import load_hallucinator
@@ -83,21 +83,21 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
         problems += around_plan
     made_for = np.repeat(np.arange(chunk.first, chunk.last), settings.problems_per_experience)
     if not settings.as_published:
-        problems += problems_for_none(chunk, source, sweeps, experiences[0].problem.bounds)
+        problems += problems_for_none(chunk, source, sweeps, experiences[0].problem)
     for_none = np.full(len(problems) - len(made_for), -1)
     write_labelled(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
     unsolved = sum(method == NO_PLAN for _, method in problems)
     return Hallucinated(len(problems), len(copied), len(chunk_experiences), unsolved)
 
 
-def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: Bounds) -> list[MadeProblem]:
+def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, like: Problem) -> list[MadeProblem]:
     """A chunk's share of the problems that no plan solves, and of ordinary problems of the class.
 
     Args:
         chunk: the chunk.
         source: of problems of the class.
         sweeps: the plans that are taught.
-        bounds: x_min, y_min, x_max, y_max in metres.
+        like: a problem with the bounds and the scale that they are to have.
     """
     settings, name = chunk.settings, chunk.class_name
     problems: list[MadeProblem] = []
@@ -106,7 +106,7 @@ def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: 
     for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
         try:
-            made = no_plan(sweeps, source.draw, rng, name, index, bounds, chunk.vehicle.scale)
+            made = no_plan(sweeps, source.draw, rng, name, index, like.bounds, like.scale)
             problems.append((made, NO_PLAN))
         except NeverBlockedError:  # then there is no such problem to learn from
             break

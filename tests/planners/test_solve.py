@@ -250,6 +250,7 @@ def test_lengths_of_attempts_are_in_real_metres(scale: float) -> None:
     assert usual.length_m is not None
     assert other.length_m == pytest.approx(scale * usual.length_m)
     assert other.duration_s == usual.duration_s
-    further = improved(other, replace(asked, scale=scale), 0.01)
+    nothing = replace(other, plan=None, solved=False, length_m=None)
+    further = improved(nothing, replace(asked, scale=scale), 1.0)
     assert further.plan is not None
     assert further.length_m == pytest.approx(scale * further.plan.length_m)

@@ -140,7 +140,7 @@ def plan_table(params: Parameters, memory: Memory, recalls: FreshRecalls) -> dic
             "numbers": [
                 f"{weights[plan]:,}",
                 f"{100 * free[plan]:.1f}",
-                f"{memory.vehicle.scale * memory.plans[plan].length_m:.1f}",
+                f"{memory.scales[0] * memory.plans[plan].length_m:.1f}",
             ],
         }
         for plan in most_used

@@ -138,7 +138,7 @@ def _plan(
     layer = answer_layer(plan, loaded.vehicle)
     return {
         "number": number,
-        "length": f"{loaded.vehicle.scale * plan.length_m:.1f}",
+        "length": f"{loaded.scales[0] * plan.length_m:.1f}",
         "duration": f"{plan.duration_s:.1f}",
         "pictures": [{"svg": world_svg(problem, loaded.vehicle, layer)} for problem in drawn],
     }

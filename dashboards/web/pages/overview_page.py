@@ -183,7 +183,7 @@ def _solved_chart(summary: pd.DataFrame, run: str) -> Chart:
     return Chart(
         "solved",
         "Share of the problems that were solved",
-        "Attempts without a plan count in every time, whatever they ended with.",
+        "Attempts without a plan count in every time, however they ended.",
         [dots(title, of_panel, "problems solved, %", (lowest, 100.0)) for title, of_panel in panels],
         summary[["panel", "planner", "configuration", "problems", "solved"]],
     )

@@ -171,7 +171,7 @@ def rank_to_try(
 ) -> tuple[Ranking, Integers]:
     """Rank N plans by how many of their swept cells are not free, and choose which to check, in what order.
 
-    Plans with at most ``likely`` blocked cells come first, the quickest to drive first. Then come some of
+    Plans with at most ``likely`` blocked cells come first, the cheapest to drive first. Then come some of
     those with at most ``possible``, the least blocked first: few where few are likely to be free, because
     then the memory is one of other problems.
 

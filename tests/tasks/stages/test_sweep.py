@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dashboards.report.tables import sweep_table
+from planners.memory.encoder.training import TrainingSettings
 from storage.tables.hallucinated import Labelled
 from tasks.fan_out.chunk import Chunk
 from tasks.reports.experience_curve import runs_of_curve
@@ -49,11 +50,23 @@ def test_a_variant_is_trained_once_and_its_figures_are_kept(
 
 
 @pytest.mark.parametrize("experiences", [100, 1_200])
-def test_a_variant_is_trained_for_what_the_run_trains_its_encoders_for(experiences: int) -> None:
-    settings = for_preset("smoke", classes=["trap"], experiences=experiences)
-    own, other = (settings.training(each, 3) for each in sweep.variants(settings)[:2])
-    assert own.by_cells == other.by_cells == (not settings.grown)
-    assert own == replace(other, architecture=own.architecture)
+def test_a_variant_is_trained_for_what_the_run_trains_its_encoders_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, experiences: int
+) -> None:
+    asked: list[TrainingSettings] = []
+
+    def trains(*given: object) -> None:
+        asked.append(given[-1])  # type: ignore[arg-type]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweep, "problems_of_memory", problems)
+    monkeypatch.setattr(sweep, "taught_masks", lambda *_: np.zeros((4, 64), np.uint64))
+    monkeypatch.setattr(sweep, "train", trains)
+    settings = replace(SETTINGS, experiences=experiences)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.sweep_chunk(Chunk(str(tmp_path), settings, "trap", 0, 0, 1, "key"))
+    assert asked == [settings.training(settings.learning, settings.seed)]
+    assert asked[0].by_cells == (not settings.grown)
 
 
 def test_an_experience_curve_ends_with_all_experiences() -> None:
