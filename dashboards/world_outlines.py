@@ -125,7 +125,7 @@ def travel_arrows(
     between these. A stretch in one gear has one in its middle even if it is as short as half of the body, of
     which a metre is ``scale`` metres of the plan.
     """
-    apart = apart or footprint_spacing_m(vehicle)
+    apart = apart or scale * footprint_spacing_m(vehicle)
     gears, ends = gears_of(plan, vehicle), [0, *cusps_of(plan, vehicle).tolist(), len(plan.states) - 1]
     arrows: list[Floats] = [np.empty((0, 5))]
     for first, last in pairwise(ends):

@@ -206,7 +206,7 @@ def _has_attempts(run: RunFolder) -> bool:
 def stamp_of(path: Path) -> Stamp:
     """What changes when the file at ``path``, or any file in the folder there, is written again."""
     paths = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
-    stamps = []
+    stamps = [(str(path), 0, 0)]  # also of what is not there
     for file in paths:
         if file.suffix != PARTIAL:
             with suppress(FileNotFoundError):  # it has just been renamed or merged

@@ -22,6 +22,7 @@ from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
+ELSEWHERE: Final = "its window is not wholly in the blocks of part"  # no fault: it may be in the other part
 LONGEST_PATH: Final = 1.5  # in distances to the goal; for a longer path another local goal would be set
 POSES: Final = 4096  # drawn at once
 MOST_EMPTY_DRAWS: Final = 100  # in succession without a usable pose: then there are none
@@ -113,7 +114,7 @@ def cut_scenarios(
             x, y = start.tolist()
             problem = surroundings.problem(x, y, heading, f"{world.name}-scenario-{number}", world.name)
             if not lie_in(part, blocks, *window_boxes(pose, surroundings.scale))[0]:
-                yield f"its window is not wholly in the blocks of part {part}"
+                yield f"{ELSEWHERE} {part}"
             elif not is_drivable(problem, vehicle, workspace):
                 yield "its start or local goal is blocked, or no path of reasonable length joins them"
             else:

@@ -29,7 +29,8 @@ def question_in(
 
     The start is uniform over the free poses of the world, at a speed from 0, or the vehicle's least, to the
     largest; the vehicle can still brake there. The goal is in any direction, at any of ``DISTANCES_M``. A
-    pose has any heading, has room for the vehicle at rest, all straight, and is to be arrived at at rest.
+    pose has any heading, has room for the vehicle, all straight, and is to be arrived at at rest, or at any
+    speed by a vehicle that cannot stop.
 
     Args:
         world: of which obstacles and bounds are taken.

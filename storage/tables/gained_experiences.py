@@ -133,8 +133,8 @@ def rows_of_class(snapshot: Path, class_name: str) -> list[int]:
 
 
 def _merge(folder: Path, vehicle: Vehicle) -> None:
-    """Merge all shards into one, unless another process is doing so, here or on another machine."""
-    with suppress(InUseError, StorageError), locked(folder / ".lock", str(folder)):
+    """Merge all shards into one, unless another process is doing so."""
+    with suppress(InUseError), locked(folder / ".lock", str(folder)):
         shards, table, digest = _kept(folder, vehicle)
         merged = folder / f"{digest}.parquet"
         write_table(merged, table)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from planners.maps.cutting import Cut, cut_problems, cut_scenarios
+from planners.maps.cutting import ELSEWHERE, Cut, cut_problems, cut_scenarios
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.world.problem import Problem
@@ -137,7 +137,7 @@ def _of_map(source: Source, part: Part, settings: ImportSettings, progress: Prog
             progress(number, len(ends))
             if isinstance(cut, Cut):
                 cuts.append(cut)
-            elif settings.strict:
+            elif settings.strict and not cut.startswith(ELSEWHERE):
                 raise StorageError(sentence(f"{source.path} scenario {number}", cut))
             else:
                 skipped.append((f"{source.path} scenario {number}", cut))

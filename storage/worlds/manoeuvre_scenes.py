@@ -50,12 +50,14 @@ def _each(
 ) -> Iterator[tuple[str, Fields | str]]:
     """The id of each case with its fields, or with why it cannot be read."""
     for number, case in enumerate(cases, start=1):
+        identity = f"number {number}"
         try:
-            identity, fields = _id(case), read(case)
+            identity = _id(case)
+            fields = read(case)
         except ValueError as error:
             if len(cases) == 1:
                 raise
-            identity, fields = f"number {number}", str(error)
+            fields = str(error)
         yield identity, fields
 
 

@@ -38,11 +38,14 @@ def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> boo
     """Whether an attempt that was repeated and judged again agrees with its row, apart from times."""
     again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
     counted = ("status", "solved", "verified", "collision_checks", "expansions", "nodes")
-    driven = again["duration_s"], row["duration_s"]  # lengths had another unit once
+    as_written = [again["length_m"], attempt.plan and attempt.plan.length_m]  # in canonical metres once
     return (
         all(again[name] == row[name] for name in counted)
         and list(again["recalled"]) == list(row["recalled"])
-        and (not attempt.solved or math.isclose(*driven, rel_tol=1e-12))
+        and (
+            not attempt.solved
+            or any(math.isclose(each or math.nan, row["length_m"], rel_tol=1e-12) for each in as_written)
+        )
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -159,7 +160,8 @@ def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -
         model: MLflow's description of the model, which this fills.
     """
     driven = said_vehicle(vehicle)
-    example = problem_class("trap", vehicle=driven).draw(0, 0)
+    scale = load_memory_or_library(archive, driven).scales[0]
+    example = replace(problem_class("trap", vehicle=driven).draw(0, 0), scale=scale)
     with scratch_folder() as scratch:
         wheel = write_wheel(scratch)
         save_model(

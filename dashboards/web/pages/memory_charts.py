@@ -124,6 +124,12 @@ def weight_chart(recalls: FreshRecalls) -> Chart:
     return _line_chart("weight", "How few plans give most of the answers", note, line, axes, table)
 
 
+def plan_length(memory: Memory, plan: int) -> str:
+    """How long a stored plan is, in real metres; of a memory of several scales in those of its vehicle."""
+    scale = memory.scales[0] if len(memory.scales) == 1 else memory.vehicle.scale
+    return f"{scale * memory.plans[plan].length_m:.1f}"
+
+
 def plan_table(params: Parameters, memory: Memory, recalls: FreshRecalls) -> dict[str, Any]:
     """The plans that answer most, and those that are free nowhere, with addresses like that of ``params``."""
     weights, free = recalls.weights, recalls.free.mean(axis=0)
@@ -140,7 +146,7 @@ def plan_table(params: Parameters, memory: Memory, recalls: FreshRecalls) -> dic
             "numbers": [
                 f"{weights[plan]:,}",
                 f"{100 * free[plan]:.1f}",
-                f"{memory.scales[0] * memory.plans[plan].length_m:.1f}",
+                plan_length(memory, plan),
             ],
         }
         for plan in most_used

@@ -17,6 +17,7 @@ from dashboards.web.pages.memory_charts import (
     FreshRecalls,
     coverage_chart,
     map_chart,
+    plan_length,
     plan_table,
     weight_chart,
 )
@@ -138,7 +139,7 @@ def _plan(
     layer = answer_layer(plan, loaded.vehicle)
     return {
         "number": number,
-        "length": f"{loaded.scales[0] * plan.length_m:.1f}",
+        "length": plan_length(loaded, number),
         "duration": f"{plan.duration_s:.1f}",
         "pictures": [{"svg": world_svg(problem, loaded.vehicle, layer)} for problem in drawn],
     }

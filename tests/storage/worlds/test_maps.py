@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import pytest
 from PIL import Image
 
 from dashboards.web.data_reader import class_names
+from planners.maps.cutting import ELSEWHERE
 from planners.maps.occupancy_map import Cells, OccupancyMap
 from storage.errors import StorageError
-from storage.worlds.importing import ImportSettings, import_part, load_map
+from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.moving_ai import read_scenarios
 from storage.worlds.sources import source_at
 from tasks.settings.run_settings import world_class
@@ -154,5 +156,20 @@ def test_a_number_of_problems_counts_those_that_are_cut_and_strict_settings_stop
             import_part(source, "train", ImportSettings(count=count)).problems[-1].id
             == every.problems[count - 1].id
         )
-    with pytest.raises(StorageError, match="scenario"):
+    faults = {reason for _, reason in every.skipped if not reason.startswith(ELSEWHERE)}
+    assert faults
+    with pytest.raises(StorageError, match="|".join(map(re.escape, faults))):
         import_part(source, "train", ImportSettings(strict=True))
+    lines = (tmp_path / "m.scen").read_text().splitlines()
+    sound = [
+        line for number, line in enumerate(lines[1:], start=1) if not _is_bad(every, source.path, number)
+    ]
+    (tmp_path / "m.scen").write_text("\n".join([lines[0], *sound]) + "\n")
+    for part in ("train", "test"):  # what lies in the other part is no fault
+        strictly = import_part(source, part, ImportSettings(strict=True))
+        assert len(strictly.problems) == len(import_part(source, part).problems)
+
+
+def _is_bad(imported: Imported, path: Path, number: int) -> bool:
+    where = f"{path} scenario {number}"
+    return any(place == where and not reason.startswith(ELSEWHERE) for place, reason in imported.skipped)

@@ -50,3 +50,7 @@ def test_a_row_that_lies_about_its_plan_does_not_agree_with_the_attempt_made_aga
     assert same_outcome(attempt, row, CAR)
     assert not same_outcome(judged_attempt(PROBLEM, wrong(attempt), set(), CAR), row, CAR)
     assert not same_outcome(attempt, {**row, "verified": False}, CAR)
+    assert attempt.length_m is not None
+    assert not same_outcome(attempt, {**row, "length_m": 1e-6 + attempt.length_m}, CAR)
+    scaled = replace(attempt, length_m=0.25 * attempt.length_m)
+    assert same_outcome(scaled, row, CAR)  # as rows were written before lengths were in real metres

@@ -212,3 +212,13 @@ def test_a_rollback_of_which_one_part_cannot_be_done_changes_nothing(registered:
         champion = registry.aliased(name)
         assert champion is not None
         assert champion.number == 2
+
+
+def test_a_registry_that_was_opened_before_anything_was_logged_sees_what_is_registered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    early = Registry(open_data_folder(tmp_path / "data"))
+    assert early.names() == []
+    Registered(tmp_path).version("one")
+    assert early.names() == [NAME]

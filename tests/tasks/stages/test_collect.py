@@ -126,6 +126,9 @@ def test_a_run_goes_on_with_fewer_experiences_and_without_a_class_of_too_few(
     assert told == [str(each) for each in shortfalls(data, uneven)]
     assert ["few has only 5 of 6" in told[0], "left out" in told[1]] == [True, True]
     assert recorded_settings(run) == settings == as_collected(data, uneven)
+    os.utime(run.settings, (1.0, 1.0))
+    assert collect(data, uneven) == settings
+    assert run.settings.stat().st_mtime == 1.0  # or the repeated run would be called newer
     for stage in (HALLUCINATE, RELABEL):  # which raises if a plan does not solve what was made for it
         run_stage(stage, data, settings)
     made_for = problems_of_memory(data, settings, COMBINED).plan_index

@@ -105,3 +105,6 @@ def test_plans_that_are_never_ranked_do_not_hide_the_others():
     assert np.isfinite(lists.centres).all()
     assert sorted(lists.plans.tolist()) == list(range(PLANS))
     assert np.diff(lists.starts).max() < PLANS / 4
+    found = best_listed(lists, vectors[7].astype(np.float32), 5)
+    assert len(found)
+    assert not set(found.tolist()) & set(never.tolist())
