@@ -96,14 +96,14 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     what its points do in half a step into or out of the state.
     """
     given = state = ca.SX.sym("state", state_size(vehicle))
-    change = limits_of(vehicle).control_high
+    limits = limits_of(vehicle)
     speed, sharpest = _absolute(state[3]), _absolute(state[4])
     if vehicle.first_order:  # covered is the step into the state, from its middle
         state = _moved(state, ca.SX.zeros(2), -0.5 * vehicle.dt, vehicle)
     else:
-        most = limits_of(vehicle).state_high
-        speed = ca.fmin(speed + vehicle.dt * change[0], max(most[3], -limits_of(vehicle).state_low[3]))
-        sharpest = ca.fmin(sharpest + vehicle.dt * change[1], most[4])
+        fastest = max(limits.state_high[3], -limits.state_low[3])
+        speed = ca.fmin(speed + vehicle.dt * limits.control_high[0], fastest)
+        sharpest = ca.fmin(sharpest + vehicle.dt * limits.control_high[1], limits.state_high[4])
     if isinstance(vehicle, DifferentialDrive):
         turn = sharpest
     else:

@@ -93,15 +93,15 @@ class LegSearch:
 
     def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats) -> Stuck:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
-        place, tried = (float(nearest[0]), float(nearest[1])), self.attempts
+        place = float(nearest[0]), float(nearest[1])
         if self._is_enclosed:
             why = MEANINGS[Status.GOAL_ENCLOSED]
-            return Stuck(ahead.stop.place, why, tried, is_enclosed=True)
+            return Stuck(ahead.stop.place, why, self.attempts, is_enclosed=True)
         if free_stop(start, self._vehicle, self._scene) is None:
             why = "the vehicle can neither stop in time nor drive on from its motion at the start"
-            return Stuck(place, why, tried)
+            return Stuck(place, why, self.attempts)
         why = "no plan leads on from where the search came nearest to the goal"
-        return Stuck(place, why, tried, float(ahead.to_go(nearest[np.newaxis])[0]))
+        return Stuck(place, why, self.attempts, float(ahead.to_go(nearest[np.newaxis])[0]))
 
     def _rests(self, state: Floats) -> bool:
         """Whether the vehicle stands, however its wheels are steered; of the first order it stops at once."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle,
 BEHIND_M: Final = 8.0  # room for trailers behind the start of canonical problems
 SCALES: Final = (2.0**-6, 2.0**6)
 ANGLES: Final = 41  # hitch angles at which bodies may not meet
-FOLDS: Final = 7  # of each hitch, for bodies that are not neighbours
+FOLDS: Final = 7  # of each hitch, where there are several between two bodies
 
 
 def check_sizes(vehicle: Vehicle) -> None:
@@ -29,49 +30,35 @@ def check_sizes(vehicle: Vehicle) -> None:
                 f"{2.0 * half_way:.3g} m, more than the {2.0 * narrow:.3g} m that it is wide; give "
                 f"{vehicle.dt * narrow / half_way:.2g} s or less"
             )
-    ahead: Vehicle | Trailer = vehicle
-    for number, trailer in enumerate(trailers_of(vehicle), start=1):
-        angles = np.linspace(-trailer.max_hitch, trailer.max_hitch, ANGLES).tolist()
-        if _shape(ahead).intersects(_turned(trailer, 0.0)):
-            angles = []  # a semi-trailer overlaps the tractor that carries it
-        for angle in angles:
-            if _shape(ahead).intersects(_turned(trailer, angle)):
-                raise ValueError(
-                    f"has a trailer {number} that touches the body in front at a hitch angle of "
-                    f"{abs(angle):.2f} rad; give a smaller max_hitch, a longer hitch_length or shorter bodies"
-                )
-        ahead = trailer
-    _check_folded(vehicle)
-
-
-def _check_folded(vehicle: Vehicle) -> None:
-    """Raise ValueError, the end of a sentence, if bodies that are not neighbours meet when it is folded."""
     trailers = trailers_of(vehicle)
-    if len(trailers) < 2:
-        return
-    from shapely import affinity  # late: few commands need it
+    chains = itertools.combinations_with_replacement(range(len(trailers)), 2)
+    for first, last in sorted(chains, key=lambda ends: ends[1] - ends[0]):  # neighbours first
+        _check_apart(trailers[first - 1] if first else vehicle, trailers[first : last + 1], last + 1)
 
-    shapes = [_shape(body) for body in (vehicle, *trailers)]
-    angles = [np.linspace(-each.max_hitch, each.max_hitch, FOLDS).tolist() for each in trailers]
-    apart: set[tuple[int, int]] | None = None  # bodies that do not overlap while all are in line
-    for hitches in [(0.0,) * len(trailers), *itertools.product(*angles)]:
-        x = y = heading = 0.0
-        bodies = shapes[:1]
-        for trailer, shape, hitch in zip(trailers, shapes[1:], hitches, strict=True):
-            heading -= hitch
-            x -= trailer.hitch_length * math.cos(heading)
-            y -= trailer.hitch_length * math.sin(heading)
-            turned = affinity.rotate(shape, heading, origin=(0.0, 0.0), use_radians=True)
-            bodies.append(affinity.translate(turned, x, y))
-        pairs = [(one, other) for other in range(len(bodies)) for one in range(other - 1)]
-        meet = {pair for pair in pairs if bodies[pair[0]].intersects(bodies[pair[1]])}
-        apart = set(pairs) - meet if apart is None else apart
-        for one, other in sorted(meet & apart):
-            names = [f"trailer {k}" if k else "the vehicle in front" for k in (one, other)]
-            told = ", ".join(f"{hitch:.2f}" for hitch in hitches)
+
+def _check_apart(ahead: Vehicle | Trailer, chain: Sequence[Trailer], number: int) -> None:
+    """Raise ValueError, the end of a sentence, if a body meets the last of a chain of trailers behind it.
+
+    Where they overlap in line they may: a semi-trailer lies on the tractor that carries it. ``number`` is
+    that of the last trailer.
+    """
+    shape, count = _shape(ahead), ANGLES if len(chain) == 1 else FOLDS
+    if shape.intersects(_behind(chain, [0.0] * len(chain))):
+        return
+    for hitches in itertools.product(
+        *(np.linspace(-each.max_hitch, each.max_hitch, count) for each in chain)
+    ):
+        if shape.intersects(_behind(chain, hitches)):
+            told = (
+                f"a trailer {number} that touches the body in front at a hitch angle of {abs(hitches[0]):.2f}"
+            )
+            if len(chain) > 1:
+                first = number - len(chain)
+                who = f"trailer {first}" if first else "the vehicle in front"
+                angles = ", ".join(f"{hitch:.2f}" for hitch in hitches)
+                told = f"{who} and trailer {number} that touch each other at hitch angles of {angles}"
             raise ValueError(
-                f"has {names[0]} and {names[1]} that touch each other at hitch angles of {told} rad; "
-                "give a smaller max_hitch, a longer hitch_length or shorter bodies"
+                f"has {told} rad; give a smaller max_hitch, a longer hitch_length or shorter bodies"
             )
 
 
@@ -103,11 +90,14 @@ def _shape(body: Vehicle | Trailer) -> Any:
     return shapely.union_all([shapely.Polygon(polygon) for polygon in _polygons(body)])
 
 
-def _turned(trailer: Trailer, hitch: float) -> Any:
-    """A trailer behind a body whose axle is at (0, 0), at a hitch angle."""
+def _behind(chain: Sequence[Trailer], hitches: Sequence[float]) -> Any:
+    """The last of some trailers behind a body whose axle is at (0, 0), at their hitch angles."""
     import shapely
 
-    cos, sin = math.cos(-hitch), math.sin(-hitch)
+    back, heading = np.zeros(2), 0.0
+    for trailer, hitch in zip(chain, hitches, strict=True):
+        heading -= hitch
+        cos, sin = math.cos(heading), math.sin(heading)
+        back -= trailer.hitch_length * np.array([cos, sin])
     turn = np.array([[cos, sin], [-sin, cos]])
-    back = np.array([-trailer.hitch_length * cos, -trailer.hitch_length * sin])
-    return shapely.union_all([shapely.Polygon(polygon @ turn + back) for polygon in _polygons(trailer)])
+    return shapely.union_all([shapely.Polygon(polygon @ turn + back) for polygon in _polygons(chain[-1])])

@@ -109,6 +109,14 @@ def _kind(ways: Ways) -> int:
 
 
 @inlined
+def _gear_to(tree: PoseTree, node: int) -> float:
+    """The gear in which the way to a node of a start tree ends, 0 at its root."""
+    if node == 0:
+        return 0.0
+    return 1.0 if tree.metres[node] > 0.0 else -1.0
+
+
+@inlined
 def _run(metres: float, gear: float, vehicle: Vehicle) -> float:
     """What a run costs, in seconds."""
     return cost_of_second(gear, vehicle) * seconds_of_run(metres, top_speed(gear, 0.0, vehicle), vehicle)
@@ -171,7 +179,7 @@ def word_is_worth(
     It leads from node ``last`` of a tree out of the start, ``before``, to a ``node`` of one out of the goal.
     """
     metres = before.runs[last]
-    gear = 0.0 if last == 0 else (1.0 if before.metres[last] > 0.0 else -1.0)
+    gear = _gear_to(before, last)
     seconds = before.seconds[last] + before.extras[last] - _run(metres, gear, vehicle)
     for k in range(PARTS):
         part = radius * word[PARTS + k]
@@ -198,7 +206,7 @@ def meeting_is_worth(
     ways: Ways, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
 ) -> bool:
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
-    gear = 0.0 if last == 0 else (1.0 if before.metres[last] > 0.0 else -1.0)
+    gear = _gear_to(before, last)
     seconds = _joined_seconds(
         tree, node, before.runs[last], gear, before.seconds[last] + before.extras[last], vehicle
     )
