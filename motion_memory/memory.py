@@ -131,9 +131,9 @@ class Memory:
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
         """Look up what is stored for a problem, without any search.
 
-        These are the plans that the encoder ranks best. From a library, and for a problem that is not
-        canonical, there is at most one, a free plan: a stored drive that was moved to a pose at rest, or
-        parts of stored plans.
+        First comes the free plan that costs least to drive, then those that the encoder ranks best. From a
+        library, and for a problem that is not canonical, there is at most one, a free plan: a stored drive
+        that was moved to a pose at rest, or parts of stored plans.
 
         Args:
             problem: as for ``plan``.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import DRIVES, Attempt
+from planners.attempt import DRIVES, SUB_PLANS, Attempt
 from planners.drive_answers import DriveAnswer, drive_answer
 from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary
@@ -128,7 +128,8 @@ def parts_found(
 
     None if whole plans of the memory are to answer the problem, or one was moved to it.
     """
-    if attempt.recall == DRIVES or (isinstance(memory, Memory) and is_canonical(problem)):
+    is_whole = isinstance(memory, Memory) and is_canonical(problem) and attempt.recall != SUB_PLANS
+    if attempt.recall == DRIVES or is_whole:
         return None
     library = memory.library if isinstance(memory, Memory) else memory
     is_blind = attempt.assist.startswith("random-")

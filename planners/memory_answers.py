@@ -21,7 +21,7 @@ from planners.search.manoeuvres.suitability import suits
 from planners.search.query import Endings, Query
 from planners.sub_plan_answers import sub_plan_answer
 from planners.world.goal import goal_of
-from planners.world.problem import Plan, is_canonical
+from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
@@ -76,14 +76,16 @@ def answer_from(
     usual = SUB_PLANS if isinstance(memory, PlanLibrary) else strategy or default_recall(memory)
     strategy = usual if use == assist else "random"
     blindly = generator(seed, "random-plans", problem.id) if strategy == "random" else None
+    whole = MemoryAnswer()
     if isinstance(memory, Memory) and is_canonical(problem):
         recalled = recall(memory, view, strategy, top_k, blindly)
-        answer = MemoryAnswer(strategy, recalled=recalled.plans, checks=recalled.checks)
-        if recalled.free < 0:
-            return answer
-        plan = turned(memory.plans[recalled.free], problem.start[2])
-        is_long = not polished and strategy != "centroid" and is_detour(plan, planner, view, vehicle)
-        return answer._replace(plan=plan, source="recalled", is_long=is_long)
+        whole = MemoryAnswer(strategy, recalled=recalled.plans, checks=recalled.checks)
+        if recalled.free >= 0:
+            plan = turned(memory.plans[recalled.free], problem.start[2])
+            is_long = not polished and strategy != "centroid" and is_detour(plan, planner, view, vehicle)
+            return whole._replace(plan=plan, source="recalled", is_long=is_long)
+        if not answers_in_parts(memory, problem):
+            return whole
     library = memory if isinstance(memory, PlanLibrary) else memory.library
     drive = DriveAnswer()
     if polished and use in JOINS and suits(goal_of(problem, vehicle), vehicle):
@@ -99,7 +101,8 @@ def answer_from(
     answer = MemoryAnswer(
         SUB_PLANS if blindly is None else strategy,
         parts.plan,
-        checks=drive.checks + parts.checks,
+        recalled=whole.recalled if parts.plan is None else (),
+        checks=whole.checks + drive.checks + parts.checks,
         endings=library.endings if use in JOINS and blindly is None else None,
         knows_way=parts.knows_way,
     )
@@ -107,6 +110,15 @@ def answer_from(
         return answer
     is_long = not polished and is_detour_from_motion(parts.plan, parts.seconds, planner, problem)
     return answer._replace(source="recalled" if parts.recalled else "searched", is_long=is_long)
+
+
+def answers_in_parts(memory: Memory, problem: Problem) -> bool:
+    """Whether parts of plans are worth a look for a canonical problem to which no whole plan leads.
+
+    They are where the problem begins with another heading than the plans: turned as a whole, these lead past
+    the goal.
+    """
+    return memory.heading is not None and not memory.begins_with(problem.start[2])
 
 
 def least_blocked(memory: Memory, recalled: Sequence[int], view: View) -> tuple[int, int]:

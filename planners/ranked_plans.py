@@ -9,15 +9,16 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import ends_of, plan_fits, turned
 from planners.memory.ranking.scores import best_plans
+from planners.memory.recall import default_recall, recall
+from planners.memory_answers import answers_in_parts
 from planners.search.free_goal import aimed_view
 from planners.search.manoeuvres.suitability import suits
 from planners.search.query import usual_limits
 from planners.sub_plan_answers import sub_plan_answer
 from planners.world.alignment import Alignment, from_canonical, scaled, shifted, to_canonical
-from planners.world.geometry.collision import scene_of
-from planners.world.geometry.occupancy import drawing_of
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, is_canonical
+from planners.world.view import View
 from planners.world.workspace import Workspace
 
 OF_PARTS = -1  # the number of a plan that is made of parts of stored plans
@@ -37,8 +38,10 @@ def ranked_plans(
 ) -> list[RankedPlan]:
     """Rank what a memory or a library has for a problem, best first.
 
-    A memory has plans for canonical problems. Other problems, and all that are put to a library, are answered
-    by one free plan: for a pose at rest a whole stored drive that is moved there, else parts of stored plans.
+    A memory has whole plans for canonical problems: first the one that ``solve`` would return, the cheapest
+    to drive of those that are free, then those that the encoder ranks best. Where none of them is free and
+    the start heading is another, and for other problems and all that are put to a library, there is one free
+    plan: for a pose at rest a whole stored drive that is moved there, else parts of stored plans.
 
     Args:
         memory: to recall from.
@@ -47,12 +50,15 @@ def ranked_plans(
         workspace: the caller's buffers; by default new ones.
 
     Returns:
-        At most k plans. None if the encoder says that no plan fits, or if no drive and no parts lead to the
-        goal.
+        At most k plans. None if no plan is free and the encoder says that none fits, or if no drive and no
+        parts lead to the goal.
     """
     canonical, alignment = to_canonical(problem)
+    whole: list[RankedPlan] = []
     if isinstance(memory, Memory) and is_canonical(canonical):
-        return _stored(memory, canonical, problem, alignment, k, workspace)
+        whole = _stored(memory, canonical, problem, alignment, k, workspace)
+        if any(each.free for each in whole) or not answers_in_parts(memory, canonical):
+            return whole
     library = memory.library if isinstance(memory, Memory) else memory
     view, vehicle = aimed_view(canonical, memory.vehicle, workspace), memory.vehicle
     moved = DriveAnswer()
@@ -61,7 +67,7 @@ def ranked_plans(
     number, plan = moved.number, moved.plan
     if plan is None:
         number, plan = OF_PARTS, sub_plan_answer(library, view, vehicle).plan
-    return [] if plan is None else [RankedPlan(number, True, 0.0, _in_frame_of(problem, alignment, plan))]
+    return whole if plan is None else [RankedPlan(number, True, 0.0, _in_frame_of(problem, alignment, plan))]
 
 
 def _stored(
@@ -72,15 +78,15 @@ def _stored(
     k: int,
     workspace: Workspace | None,
 ) -> list[RankedPlan]:
-    workspace = workspace or Workspace()
-    scene, bits = scene_of(canonical), drawing_of(canonical, workspace).occupied
-    scores = memory.scores(memory.forward(bits), bits, workspace)
+    view = View(canonical, workspace or Workspace())
+    best = recall(memory, view, default_recall(memory), 1).free
+    scores = memory.scores(memory.forward(view.bits), view.bits, view.workspace)
     ranked = []
-    for i in best_plans(scores, k).tolist():
-        free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
+    for i in ([best] if best >= 0 else []) + [i for i in best_plans(scores, k).tolist() if i != best]:
+        free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), view.scene)
         plan = _in_frame_of(problem, alignment, turned(memory.plans[i], canonical.start[2]))
         ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), plan))
-    return ranked
+    return ranked[:k]
 
 
 def _in_frame_of(problem: Problem, alignment: Alignment, plan: Plan) -> Plan:

@@ -1,4 +1,4 @@
-"""Solves a problem: recall, check, help, search. Only here memory and planners meet (paper, III-D).
+"""Solves a problem: recall, check, help, search. Here what a memory has and the planners meet (paper, III-D).
 
 Planning time is measured once, around everything between receiving a problem and returning a plan, but for
 the compiling of kernels, which happens once on a machine.
@@ -56,8 +56,8 @@ def solve(
 ) -> Attempt:
     """Solve a problem: try stored plans first, as the assist says, then search.
 
-    Memories hold plans for canonical problems. Other problems, and all that are put to a library of plans,
-    are answered by parts of plans where possible. For a pose at rest ``join`` (as ``open`` and ``repair`` do
+    Memories hold plans for canonical problems. Other problems, those that begin with another heading than the
+    plans, and all that are put to a library of plans, are answered by parts of plans where possible. For a pose at rest ``join`` (as ``open`` and ``repair`` do
     then) first moves whole stored drives to the problem and polishes them. If that fails, it aims the search
     of the lattice at every place from which the end of a stored plan leads to the pose.
 
@@ -259,7 +259,7 @@ def improved(
     )
     attempt = replace(
         attempt,
-        planning_seconds=attempt.planning_seconds + more.seconds,
+        planning_seconds=attempt.planning_seconds + working_clock() - view.began,
         search_seconds=attempt.search_seconds + more.seconds,
         collision_checks=attempt.collision_checks + more.collision_checks,
         expansions=attempt.expansions + more.expansions,

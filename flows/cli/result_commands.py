@@ -41,7 +41,7 @@ def verify(
     from tasks.requests.verify import VerifiedMap
     from tasks.requests.verify import verify as task
     from tasks.requests.verify_plans import NO_PLAN
-    from tasks.settings.errors import UsageError
+    from tasks.settings.errors import RunError, UsageError
 
     reading = import_settings(
         "car", 1, scale=None, resolution=resolution, unknown=unknown, tolerance=tolerance
@@ -54,8 +54,9 @@ def verify(
     checked = task(path, problems, sample, worker_count(workers), on_map)
     lines = [f"{count:9,} {what}" for what, count in checked.items()]
     was_judged = any(count for what, count in checked.items() if what != NO_PLAN)
-    end = "No fault found." if was_judged else "There was no plan to judge."
-    write_answer(*lines, end, checked=dict(checked))
+    write_answer(*lines, *(["No fault found."] if was_judged else []), checked=dict(checked))
+    if not was_judged:
+        raise RunError(f"{path} holds no plan to judge.")
 
 
 def export(run: Path, *, format: str, out: Path) -> None:

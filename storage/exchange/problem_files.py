@@ -23,6 +23,7 @@ FIELDS: Final = (
     "id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale", "vehicle",
     *QUESTION_FIELDS,
 )  # fmt: skip
+MOVING: Final = "moving"  # obstacles that move: there may be none
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
 SLICES_A_GROUP: Final = 16  # reading the last rows of a row group also decodes those before
 BUFFER_BYTES: Final = 1 << 20
@@ -58,9 +59,7 @@ def format_of(path: Path) -> str:
 
 def check_problem_fields(fields: Sequence[object]) -> None:
     """Raise ValueError if a problem has no field of one of these names, or if one occurs twice."""
-    if "moving" in fields:
-        raise ValueError("has the field 'moving', but obstacles that move are not supported; leave it out")
-    check_fields(fields, FIELDS)
+    check_fields(fields, (*FIELDS, MOVING))
 
 
 def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:

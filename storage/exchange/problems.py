@@ -16,6 +16,7 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
 from storage.exchange.obstacle_fields import groups_of, points_of
 from storage.exchange.problem_files import (
+    MOVING,
     ProblemSlice,
     Unreadable,
     check_problem_fields,
@@ -216,6 +217,8 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, expected an object with {', '.join(_REQUIRED)}")
     check_problem_fields(list(fields))
+    if fields.get(MOVING) not in (None, []):
+        raise ValueError("has obstacles in 'moving', but what moves is not supported; leave them out")
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")

@@ -52,7 +52,8 @@ def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float,
     if fields.get("start_hitch") is not None:
         motion.update(zip(hitches, numbers_of(fields, "start_hitch", len(hitches)), strict=True))
     values = list(motion.values())
-    while values and values[-1] == 0.0:
+    least = int(vehicle.min_speed > 0.0)  # its speed is never left out, as it would not be 0 then
+    while len(values) > least and values[-1] == 0.0:
         values.pop()
     return tuple(values)
 

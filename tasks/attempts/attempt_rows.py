@@ -52,8 +52,11 @@ def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> boo
 @functools.cache
 def commit() -> str:
     """The commit of the sources; empty if they are not a checkout."""
-    command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
+    sources = Path(__file__).parents[2]
+    command = ["git", "-C", str(sources), "rev-parse", "--show-toplevel", "HEAD"]
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+        told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout
     except (OSError, subprocess.SubprocessError):
         return ""
+    checkout, head = told.splitlines()
+    return head if Path(checkout) == sources.resolve() else ""  # installed in a checkout of something else

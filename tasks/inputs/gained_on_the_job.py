@@ -9,7 +9,8 @@ from typing import Final, NamedTuple
 
 from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
-from planners.world.problem import Problem, is_canonical
+from planners.memory.plans.free import START_TOLERANCE
+from planners.world.problem import CANONICAL_START, Problem, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place
@@ -42,7 +43,11 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     new = [
         (Experience(problem, attempt.plan, vehicle), attempt)
         for problem, attempt in attempts
-        if attempt.plan is not None and attempt.source in NEW and is_canonical(problem)
+        if attempt.plan is not None
+        and attempt.source in NEW
+        and is_canonical(problem)
+        # one plan of another heading in a memory, and cells could rank none of them
+        and abs(problem.start[2] - CANONICAL_START[2]) <= START_TOLERANCE
     ]
     if new:
         add_gained(

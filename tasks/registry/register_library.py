@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from planners.world.vehicles.vehicle import Vehicle, name_of
-from storage.places.data_folder import DataFolder
+from storage.places.data_folder import open_data_folder
 from storage.vehicles.vehicle_files import text_of
 from tasks.registry.champion_registry import Registry
 from tasks.registry.model_uris import memory_digest, set_mlflow_environment
+from tasks.servers.prefect_server import set_environment
 from tasks.settings.environment import default_data
 from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
 
@@ -37,9 +38,10 @@ def register_library(
     Raises:
         RunError: MLflow does not answer.
     """
+    data = open_data_folder(default_data())
+    set_environment(data.path)
     set_mlflow_environment()
-    data = str(default_data().absolute())
-    digest, log = memory_digest(folder), tracker(data)
+    digest, log = memory_digest(folder), tracker(data.place)
     title = f"library {name} {digest[:8]}"
     with log.run(title, STAGE, {}) as run_id:
         if not log.is_logged(run_id, digest, "memory"):
@@ -49,5 +51,4 @@ def register_library(
             log.metrics(run_id, [metrics], model_id=model_id)
             log.mark_logged(run_id, digest, "memory")
     run_id, model_id = log.logged_memory(title, name, digest)
-    registry = Registry(DataFolder(Path(data)))
-    return registry.register(name, run_id, model_id, digest, {"memory": name}, "A library of plans").uri
+    return Registry(data).register(name, run_id, model_id, digest, {"memory": name}, "A library of plans").uri

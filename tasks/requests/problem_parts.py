@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -138,7 +139,7 @@ def solve_part(chunk: FilePart) -> PartResult:
 def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> PartResult:
     """Like ``solve_part``, and call ``on_problem`` after each problem."""
     request = chunk.request
-    assistant = _assistant(request.settings, request.memory_digest)
+    assistant = _OF_THREAD.assistant(request.settings, request.memory_digest)
     rows = chunk.rows_begun()
     before = len(rows)
     solved: list[Solved] = []
@@ -201,10 +202,19 @@ SOLVE: Final = Job(
 )
 
 
-@functools.lru_cache(maxsize=1)
+class _OfThread(threading.local):
+    """What a thread has for itself: an assistant's buffers are for one attempt at a time."""
+
+    def __init__(self) -> None:
+        self.assistant = functools.lru_cache(maxsize=1)(_assistant)
+
+
 def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
-    """The assistant of this process, which keeps the memories that it has loaded."""
+    """Make an assistant, which keeps the memories that it has loaded."""
     return Assistant(settings)
+
+
+_OF_THREAD: Final = _OfThread()
 
 
 def plans_are_there(part: FilePart, identities: Sequence[str]) -> bool:

@@ -26,10 +26,11 @@ from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.encoders import load_encoder
 from storage.archives.hallucinators import load_hallucinator
+from storage.archives.libraries import HEADERS
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
-from storage.places.mirror import is_there
+from storage.places.mirror import folders_in, is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences, vehicle_of_experiences
@@ -41,6 +42,7 @@ from tasks.attempts.attempt_rows import same_outcome
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
+from tasks.requests.verify_plans import judged_stored_plans
 from tasks.settings.errors import RunError, tell_faults
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings
@@ -72,8 +74,13 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
     for gained in data.gained_folders():
         checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in gained_shards(gained)]
+    checks += [
+        partial(_library, path)
+        for path in folders_in(data.libraries)
+        if any(is_there(path / header) for header in HEADERS)
+    ]
     if not checks:
-        raise RunError(f"{folder} does not hold a run; make one with `motion-memory run`.")
+        raise RunError(f"{folder} does not hold a run or a library; make one with `motion-memory run`.")
     checked: Counter[str] = Counter()
     faults_found: list[str] = []
     context = multiprocessing.get_context("spawn")
@@ -131,6 +138,11 @@ def _experiences(path: Path, vehicle: Vehicle | None) -> Findings:
         for fault in faults(experience.problem, experience.plan, vehicle)
     ]
     return Counter({"plans of experiences re-simulated and checked by FCL": len(experiences)}), wrong
+
+
+def _library(folder: Path) -> Findings:
+    count, wrong = judged_stored_plans(folder)
+    return Counter({"plans of libraries re-simulated, within their vehicle's limits": count}), wrong
 
 
 def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) -> Findings:

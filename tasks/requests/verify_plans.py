@@ -48,15 +48,23 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
         RunError: a plan is faulty; the faults are logged.
         StorageError: the memory or library is damaged.
     """
+    count, wrong = judged_stored_plans(folder)
+    _refuse(wrong, f" in {folder}; make it again")
+    return Counter({_BY_ITSELF: count})
+
+
+def judged_stored_plans(folder: Path) -> tuple[int, list[str]]:
+    """How many plans the memory or library in a folder holds, and a line for each fault of one.
+
+    Raises StorageError if it is damaged.
+    """
     vehicle = vehicle_of(folder)
     stored = load_memory_or_library(folder, vehicle)
-    wrong = [
+    return len(stored.plans), [
         f"{folder}: plan {number}: {fault}"
         for number, plan in enumerate(stored.plans)
         for fault in faults(by_itself(plan), plan, vehicle)
     ]
-    _refuse(wrong, f" in {folder}; make it again")
-    return Counter({_BY_ITSELF: len(stored.plans)})
 
 
 def verify_plan_files(path: Path, problems: Path | None, on_map: MapJudge | None = None) -> Counter[str]:

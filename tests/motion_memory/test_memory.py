@@ -135,7 +135,7 @@ def test_a_field_that_is_not_understood_is_refused(planner: Memory, as_text: boo
         ("start_sped", "'start_speed'"),
         ("moving", "supported"),
     ):
-        fields = {**fields_of(problem(0)), name: []}
+        fields = {**fields_of(problem(0)), name: [0]}
         with pytest.raises(ValueError, match=f"'{name}'.*{told}"):
             planner.plan(json.dumps(fields) if as_text else fields)
     with pytest.raises(ValueError, match="'obstacles' more than once"):

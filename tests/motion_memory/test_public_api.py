@@ -17,7 +17,7 @@ import pytest
 import motion_memory
 from planners.memory.library.plan_library import gathered_library
 from planners.world.classes.families import family
-from planners.world.problem import Plan
+from planners.world.problem import CANONICAL_START, Plan
 from planners.world.vehicles.vehicle import CAR, VEHICLES
 from storage.archives.libraries import save_library
 from storage.archives.memories import load_memory, save_memory
@@ -53,14 +53,29 @@ def test_a_plan_is_accepted_by_the_judge_and_a_changed_one_is_not(memory: motion
 def test_what_is_recalled_is_ranked_and_free_plans_are_accepted(memory: motion_memory.Memory) -> None:
     ranked = memory.recall(problem(0), k=len(memory))
     assert 0 < len(ranked) <= len(memory)
-    scores = [each.score for each in ranked]
+    scores = [each.score for each in ranked[1:]]
     assert scores == sorted(scores, reverse=True)
     free = [each for each in ranked if each.free]
     assert 0 < len(free) < len(ranked)
+    assert ranked[0].plan.duration_s == min(each.plan.duration_s for each in free)
+    assert memory.recall(problem(0), k=1)[0].number == ranked[0].number
     for each in free:
         assert memory.check(problem(0), each.plan) == []
     with pytest.raises(ValueError, match="k is 0"):
         memory.recall(problem(0), k=0)
+
+
+@pytest.mark.parametrize("turn", [-2.5, -0.1, 0.3, 1.5])
+def test_the_usual_place_is_reached_by_parts_if_the_start_looks_elsewhere(
+    memory: motion_memory.Memory, turn: float
+) -> None:
+    x, y, heading = CANONICAL_START
+    asked = replace(strewn(3, 4), start=(x, y, heading + turn))
+    (recalled,) = memory.recall(asked)
+    assert recalled.free
+    assert memory.check(asked, recalled.plan) == []
+    answer = replace(memory, polished=False).plan(asked)
+    assert (answer.status, answer.source) == ("solved", "recalled")
 
 
 def test_a_library_and_a_memory_recall_an_answer_to_any_question(

@@ -66,16 +66,14 @@ def _told(words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any,
 def test_nothing_is_called_faultless_where_nothing_was_judged(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    ends = []
-    for name in ("walled", "one"):
+    for name, code in (("walled", 1), ("one", 0)):
         _told(
             f"solve {name}.json --planner gust --out {name}.parquet --plans {name}",
             place,
             monkeypatch,
             capsys,
         )
-        ends.append(_told(f"verify {name}", place, monkeypatch, capsys)["lines"][-1])
-    assert ends[0] != ends[1]
+        _told(f"verify {name}", place, monkeypatch, capsys, code)
 
 
 @pytest.mark.parametrize(

@@ -167,7 +167,10 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal_speed": [2, 1]}, "goal_speed [2, 1] is inverted"),
         ({"goal_speed": [5, 6]}, "beyond the vehicle"),
         ({"goal_hitch": [0.1]}, "has no trailer; name the vehicle"),
-        ({"moving": []}, "obstacles that move are not supported"),
+        (
+            {"moving": [{"polygon": [[1, 1], [2, 1], [2, 2]], "velocity": [1, 0]}]},
+            "what moves is not supported",
+        ),
         ({"scale": 0}, "scale is 0; expected"),
         ({"scale": math.nan}, "scale is nan; expected"),
         ({"scale": "large"}, "scale must hold numbers"),
@@ -214,6 +217,13 @@ def test_a_bad_problem_is_one_line_with_file_place_and_id(
     assert reason in text
     assert "id" in change or "(id 'w-17')" in text
     assert ending == ".json" or "line 2" in text
+
+
+@pytest.mark.parametrize("value", [None, []])
+def test_a_problem_may_say_that_nothing_moves(tmp_path: Path, value: object) -> None:
+    path = tmp_path / "p.json"
+    path.write_text(json.dumps({**GOOD, "moving": value}))
+    assert len(read_problems(path)) == 1
 
 
 @pytest.mark.parametrize("value", ["[]", "3", "null", '"w"', "[[1, 2]]"])

@@ -98,6 +98,14 @@ def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, sol
     assert {each.problem.id for each in _candidates(tmp_path, settings)} == {solved[0].problem.id}
 
 
+def test_only_what_begins_straight_ahead_is_learned(tmp_path: Path, solved: list[Solved]) -> None:
+    turned = [
+        _solved(replace(problem, start=(*problem.start[:2], problem.start[2] + 1e-3)))
+        for problem, _ in solved[:2]
+    ]
+    assert remember(tmp_path, [*turned, solved[2]], CAR) == 1
+
+
 def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) -> None:
     again = [Solved(problem, replace(attempt, source="recalled")) for problem, attempt in solved]
     assert remember(tmp_path, again, CAR) == 0

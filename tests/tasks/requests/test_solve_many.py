@@ -7,7 +7,9 @@ import logging
 import math
 import os
 import shutil
+import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -84,6 +86,33 @@ def test_few_problems_are_shared_out_once_they_take_long_and_the_rows_are_the_sa
         assert solve_many(ASSISTANT, problems, out, workers=2, flow=flow).solved_now == COUNT
         assert begun == expected
         assert equal_but_for_seconds(read_attempts(out), undisturbed)
+
+
+def test_threads_that_share_a_process_share_no_assistant(
+    problems: Path, tmp_path: Path, undisturbed: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class OfOneThread(Assistant):
+        made_in: int
+
+        def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
+            if not hasattr(self, "made_in"):
+                self.made_in = threading.get_ident()
+            assert self.made_in == threading.get_ident()
+            return super().__call__(problem)
+
+    monkeypatch.setattr(parts, "Assistant", OfOneThread)
+    out = tmp_path / "rows.parquet"
+    cut = parts.parts_of(parts.SolveRequest(problems, out, ASSISTANT, ""))
+    met = threading.Barrier(2)  # both threads work at the same time
+
+    def run(part: parts.FilePart) -> None:
+        met.wait()
+        parts.SOLVE.run(part)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(run, cut[: len(cut) // 2 * 2]))
+    solve_many(ASSISTANT, problems, out)
+    assert equal_but_for_seconds(read_attempts(out), undisturbed)
 
 
 def test_a_file_is_cut_into_parts_that_workers_can_share(

@@ -17,6 +17,7 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR
 from storage.archives.libraries import save_library
 from storage.exchange.problems import write_problems
+from storage.places.data_folder import open_data_folder
 from tests.tasks.served import write_memory
 from tests.worlds import box, problem_of
 
@@ -40,6 +41,18 @@ def test_the_plans_of_a_memory_and_of_a_library_are_judged(
     told = capsys.readouterr().err
     assert "plan 1" in told
     assert "plan 0" not in told
+
+
+def test_libraries_in_a_data_folder_are_judged_with_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "data" / "libraries" / "general"
+    open_data_folder(tmp_path / "data")
+    for acceleration, code in ((0.5, 0), (2.0, 1)):
+        plan = _driven(acceleration * CAR.max_acceleration)
+        save_library(folder, gathered_library("general", CAR, [("one", plan)]))
+        assert call(["verify", str(tmp_path / "data")]) == code
+    assert "plan 0" in capsys.readouterr().err
 
 
 def test_a_folder_of_something_else_is_refused_in_a_line(
