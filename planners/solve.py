@@ -57,9 +57,10 @@ def solve(
     """Solve a problem: try stored plans first, as the assist says, then search.
 
     Memories hold plans for canonical problems. Other problems, those that begin with another heading than the
-    plans, and all that are put to a library of plans, are answered by parts of plans where possible. For a pose at rest ``join`` (as ``open`` and ``repair`` do
-    then) first moves whole stored drives to the problem and polishes them. If that fails, it aims the search
-    of the lattice at every place from which the end of a stored plan leads to the pose.
+    plans, and all that are put to a library of plans, are answered by parts of plans where possible. For a
+    pose at rest ``join`` (as ``open`` and ``repair`` do then) first moves whole stored drives to the problem
+    and polishes them. If that fails, it aims the search of the lattice at every place from which the end of a
+    stored plan leads to the pose.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
     costs least to drive, else search. A free plan that is a long detour is the answer only if a short search
