@@ -96,6 +96,8 @@ def solve_many(
     seed: int = 1,
     plans: str | Path | None = None,
     polished: bool = True,
+    time_limit: float | None = None,
+    improve_seconds: float = 0.0,
 ) -> None:
     """Solve each problem of a file in this process, and write one row each (docs/problem-files.md).
 
@@ -114,6 +116,8 @@ def solve_many(
         seed: everything random follows from it.
         plans: a folder for the plans, one file each; by default none are written.
         polished: as of ``load``.
+        time_limit: as of ``Memory.plan``.
+        improve_seconds: as of ``Memory.plan``.
 
     Raises:
         UsageError: A name is unknown, a number, flag or path is not one, or a file would be written over
@@ -135,5 +139,7 @@ def solve_many(
         seed=seed,
         vehicle=settled_vehicle(vehicle, Path(problems), stored),
         polished=polished,
+        time_limit=time_limit,
+        improve_seconds=improve_seconds,
     )
     solve_file(settings, Path(problems), Path(out), None if plans is None else Path(plans))

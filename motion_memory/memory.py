@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, Final
 
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.plain import plain
@@ -14,7 +14,8 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
 from planners.ranked_plans import RankedPlan, ranked_plans
-from planners.solve import solve
+from planners.search.query import usual_limits
+from planners.solve import improved, solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
@@ -25,8 +26,10 @@ from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
-from tasks.settings.checks import is_whole
+from tasks.settings.checks import check_times, is_whole
 from tasks.settings.errors import UsageError
+
+_TIMES: Final = ("time_limit", "improve_seconds")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +50,12 @@ class Answer:
 class Memory:
     """Stored plans and a planner that uses them. Several threads may use it at the same time."""
 
-    stored: StoredMemory | PlanLibrary
+    stored: StoredMemory | PlanLibrary | None  # None: the planner is alone
+    vehicle: Vehicle  # that the plans are for
     planner: str
     assist: str
     top_k: int
-    strategy: str  # of recall
+    strategy: str | None  # of recall
     seed: int
     judged: bool
     polished: bool = True  # False: plans as they are found
@@ -59,31 +63,38 @@ class Memory:
 
     def __len__(self) -> int:
         """Count the stored plans."""
-        return len(self.stored.plans)
+        return 0 if self.stored is None else len(self.stored.plans)
 
     def __repr__(self) -> str:
         """Say what the memory holds, and how it plans."""
-        return f"<Memory of {self.stored.class_name}: {len(self)} plans, {self.planner}, {self.assist}>"
+        name = "nothing" if self.stored is None else self.stored.class_name
+        return f"<Memory of {name}: {len(self)} plans, {self.planner}, {self.assist}>"
 
-    @property
-    def vehicle(self) -> Vehicle:
-        """The vehicle that the plans are for."""
-        return self.stored.vehicle
-
-    def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
+    def plan(
+        self,
+        problem: Problem | Mapping[str, Any] | str,
+        *,
+        time_limit: float | None = None,
+        improve_seconds: float = 0.0,
+    ) -> Answer:
         """Plan for one problem; if there is no plan, the answer says so.
 
         Args:
             problem: a ``Problem``, which is not checked again, or a problem in the exchange format
                 (docs/problem-files.md) as a mapping or JSON text. A mapping may hold tuples, and NumPy's
                 arrays and numbers.
+            time_limit: seconds of planning, after which the best plan so far is the answer; what that is then
+                depends on the machine. By default planning ends by its work, in the same way on any machine.
+            improve_seconds: seconds to go on looking for a better plan, or for a first one.
 
         Raises:
-            ValueError: the problem is malformed or impossible, or the memory is not made for its scale.
+            ValueError: the problem is malformed or impossible, the memory is not made for its scale, or a
+                time is none.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        return self._planned(self._read(problem), began)
+        check_times(time_limit, improve_seconds, _TIMES)
+        return self._planned(self._read(problem), began, time_limit, improve_seconds)
 
     def plan_arrays(
         self,
@@ -96,6 +107,9 @@ class Memory:
         scale: float | None = None,
         start_motion: tuple[float, ...] = (),
         arrival: Arrival | None = None,
+        *,
+        time_limit: float | None = None,
+        improve_seconds: float = 0.0,
     ) -> Answer:
         """Plan for a problem that is already in arrays; otherwise like ``plan``.
 
@@ -115,18 +129,21 @@ class Memory:
                 or turn rate (rad/s), hitch angles (rad). Missing entries are 0.
             arrival: what a goal of two numbers asks for besides the place: heading, speeds, hitch angles,
                 with tolerances.
+            time_limit: as for ``plan``.
+            improve_seconds: as for ``plan``.
 
         Raises:
-            ValueError: an array has another shape, the goal is a pose and there is an arrival too, or the
-                problem is impossible.
+            ValueError: an array has another shape, the goal is a pose and there is an arrival too, the
+                problem is impossible, or a time is none.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
+        check_times(time_limit, improve_seconds, _TIMES)
         problem = problem_of_arrays(
             *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
             vehicle=self.vehicle,
         )
-        return self._planned(problem, began)
+        return self._planned(problem, began, time_limit, improve_seconds)
 
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
         """Look up what is stored for a problem, without any search.
@@ -142,9 +159,12 @@ class Memory:
         Raises:
             ValueError: The problem is malformed or impossible, the memory is not made for its scale, or ``k``
                 is no whole number above 0.
+            UsageError: There is no memory.
         """
         if not is_whole(k, 1):
             raise ValueError(f"k is {k!r}: give a whole number, 1 or more")
+        if self.stored is None:
+            raise UsageError("Nothing can be recalled without a memory: name one where you call load.")
         read = self._read(problem)
         fault = scale_fault(self.stored, read.scale)
         if fault is not None:
@@ -183,16 +203,21 @@ class Memory:
             return problem_of(fields, "problem", self.vehicle)
         return problem_of(plain(fields), "problem", self.vehicle)
 
-    def _planned(self, problem: Problem, began: float) -> Answer:
+    def _planned(
+        self, problem: Problem, began: float, time_limit: float | None, improve_seconds: float
+    ) -> Answer:
         canonical, alignment = to_canonical(problem)
+        limits = None if time_limit is None else replace(usual_limits(canonical), seconds=time_limit)
         with self._workspace() as workspace:
             attempt = solve(
-                *(canonical, self.planner, self.assist, self.top_k, self.stored, self.seed),
+                *(canonical, self.planner, self.assist, self.top_k, self.stored, self.seed, limits),
                 vehicle=self.vehicle,
                 strategy=self.strategy,
                 workspace=workspace,
                 polished=self.polished,
             )
+            if improve_seconds > 0.0:
+                attempt = improved(attempt, canonical, improve_seconds, self.vehicle, workspace)
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
         plan = plan and shifted(plan, problem.offset)
         spent = (attempt.planning_seconds, perf_counter() - began)

@@ -14,17 +14,17 @@ from planners.world.problem import Problem
 
 
 @functools.cache
-def _loaded(memory: str, options: tuple[tuple[str, Any], ...]) -> Memory:
+def _loaded(memory: str | None, options: tuple[tuple[str, Any], ...]) -> Memory:
     return load(memory, **dict(options))
 
 
 @task(name="plan", persist_result=False)
-def plan_task(problem: Problem | Mapping[str, Any] | str, memory: str, **options: Any) -> Answer:
+def plan_task(problem: Problem | Mapping[str, Any] | str, memory: str | None, **options: Any) -> Answer:
     """Plan for one problem; each worker process loads a memory once.
 
     Args:
         problem: as for ``Memory.plan``.
-        memory: the folder of a memory or a run, or the address of a model in MLflow.
+        memory: as for ``load``.
         options: of ``load``, such as ``planner="gust"``.
 
     Raises:

@@ -53,6 +53,7 @@ def plan(
     *,
     pick: str | None = None,
     assist: AssistName | None = None,
+    time_limit: float | None = None,
     improve_seconds: float = 0.0,
     explain: Annotated[bool, Parameter(negative=())] = False,
     out: Path | None = None,
@@ -68,6 +69,8 @@ def plan(
             is only one.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
+        time_limit: Seconds of planning, after which the best plan so far is the answer. What that is depends
+            on the machine; a car in the open needs 0.01.
         improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
@@ -80,7 +83,7 @@ def plan(
     from tasks.requests.plan_one import plan_one
     from tasks.settings.errors import RunError
 
-    assistant = Assistant(options.settings(assist, improve_seconds, problem))
+    assistant = Assistant(options.settings(assist, improve_seconds, problem, time_limit=time_limit))
     attempt, found, answer, failure, written = plan_one(
         assistant, problem, out, picture, explain, learn, pick
     )
@@ -146,6 +149,7 @@ def solve(
     problems: Path,
     *,
     assist: AssistName | None = None,
+    time_limit: float | None = None,
     improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
@@ -159,6 +163,8 @@ def solve(
         problems: A .json, .jsonl or .parquet file.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
+        time_limit: Seconds of planning, after which the best plan so far is the answer. What that is depends
+            on the machine; a car in the open needs 0.01.
         improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
@@ -168,7 +174,7 @@ def solve(
     """
     from tasks.requests.solve_many import solve_many
 
-    settings = options.settings(assist, improve_seconds, problems)
+    settings = options.settings(assist, improve_seconds, problems, time_limit=time_limit)
     solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
     write_for_people(options.vehicle_line(settings, problems))
     _write_summary(solved)

@@ -45,12 +45,14 @@ class SolveOptions:
         assist: str | None,
         improve_seconds: float = 0.0,
         problems: Path | None = None,
+        time_limit: float | None = None,
         without_memory: str = "none",
     ) -> AssistantSettings:
         """These options as the settings of an assistant.
 
         ``assist``: its name, or None for repair with a memory and ``without_memory`` without one.
         ``improve_seconds``: how long to improve each plan. ``problems``: the file, which may state a vehicle.
+        ``time_limit``: after how many seconds planning ends.
         """
         from tasks.registry.settled_vehicle import settled_vehicle
         from tasks.requests.assistant import AssistantSettings
@@ -68,6 +70,7 @@ class SolveOptions:
             improve_seconds,
             self.recall,
             not self.unpolished,
+            time_limit,
         )
 
     def vehicle_line(self, settings: AssistantSettings, problems: Path | None = None) -> str:

@@ -68,7 +68,9 @@ class LatticeSettings(NamedTuple):
 
 NOWHERE = place(0.0, 0.0, 0.0)
 TRIALS = 4  # for which expansions are left in any case
-KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for what follows
+KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for their polish, ...
+KEPT_OF_FEW = 0.75  # ... and if they are few ...
+ENOUGH_S = 1.0  # ... at most so many
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
@@ -204,7 +206,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return manoeuvring.is_enclosed
 
     def halfway() -> float:
-        return latest - KEPT_BACK * (latest - working_clock())
+        left = latest - working_clock()
+        return latest - max(KEPT_BACK * left, min(KEPT_OF_FEW * left, ENOUGH_S))
 
     def beside(work: int) -> Plan | None:
         if squeezed is not None or query.beside is None:

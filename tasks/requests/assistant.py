@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -27,7 +26,7 @@ from tasks.attempts.compile_assists import EMPTY, compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import check_asked, check_no_recall, checked_vehicle
+from tasks.settings.checks import check_asked, check_no_recall, check_times, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -50,6 +49,7 @@ class AssistantSettings(NamedTuple):
     improve_seconds: float = 0.0  # how long to improve a plan after it is found
     recall: str | None = None  # None takes the strategy that suits the memory
     polished: bool = True  # False takes the first plan as it is found: sooner there, longer to drive
+    time_limit: float | None = None  # seconds, after which planning ends with what it has; None: no limit
 
 
 class Assistant:
@@ -62,13 +62,12 @@ class Assistant:
             UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
             StorageError: the memory lies in object storage and cannot be fetched.
         """
-        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall, polished = settings
+        planner, assist, top_k, memory, seed, _, improve_seconds, recall, polished, time_limit = settings
         check_asked(planner, assist, recall, top_k, seed, polished, "top-k")
-        vehicle = checked_vehicle(vehicle)
+        vehicle = checked_vehicle(settings.vehicle)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
-        if not 0.0 <= improve_seconds < math.inf:
-            raise UsageError(f"--improve-seconds is {improve_seconds}: give 0 or more.")
+        check_times(time_limit, improve_seconds, ("--time-limit", "--improve-seconds"))
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         # files that it may read, which must not be overwritten
@@ -141,6 +140,8 @@ class Assistant:
     ) -> Attempt:
         """Attempt a canonical problem, with other settings if given; the plan is not checked."""
         assist = assist or self.settings.assist
+        if limits is None and self.settings.time_limit is not None:
+            limits = replace(usual_limits(canonical), seconds=self.settings.time_limit)
         return solve(
             canonical,
             self.settings.planner,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Final
 
@@ -75,6 +75,29 @@ def check_flag(name: str, value: object) -> None:
     """Refuse what is no truth value, since any text would count as true; ``name`` as in ``check_whole``."""
     if not isinstance(value, bool):
         raise UsageError(f"{name} is {value!r}: give True or False.")
+
+
+def check_times(time_limit: float | None, improve_seconds: float, names: tuple[str, str]) -> None:
+    """Refuse a limit of time or a time for improvement that is none.
+
+    Args:
+        time_limit: seconds above 0; None is no limit.
+        improve_seconds: seconds, 0 or more.
+        names: what the caller calls the two.
+
+    Raises:
+        UsageError: one of them is wrong.
+    """
+    limit, improvement = names
+    if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
+        raise UsageError(f"{limit} is {time_limit!r}: give more than 0 seconds.")
+    if not (is_number(improve_seconds) and improve_seconds >= 0.0):
+        raise UsageError(f"{improvement} is {improve_seconds!r}: give 0 or more seconds.")
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number; a truth value is none."""
+    return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
 
 
 def check_path(name: str, value: object) -> None:

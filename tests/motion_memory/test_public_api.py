@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -78,6 +79,52 @@ def test_the_usual_place_is_reached_by_parts_if_the_start_looks_elsewhere(
     assert (answer.status, answer.source) == ("solved", "recalled")
 
 
+@pytest.fixture(scope="module")
+def alone() -> motion_memory.Memory:
+    return motion_memory.load(None)
+
+
+def test_a_planner_needs_no_memory(alone: motion_memory.Memory) -> None:
+    answer = alone.plan(problem(0))
+    assert (answer.status, answer.source, len(alone)) == ("solved", "searched", 0)
+    with pytest.raises(motion_memory.UsageError, match="without a memory"):
+        alone.recall(problem(0))
+    with pytest.raises(motion_memory.UsageError, match="'repair' needs a memory"):
+        motion_memory.load(None, assist="repair")
+    jackal = motion_memory.load(None, vehicle=str(ROOT / "docs" / "vehicles" / "jackal.yaml"), warm=False)
+    assert jackal.vehicle.scale < 1.0
+
+
+@pytest.mark.parametrize("planner", ["lattice", "gust"])
+def test_a_limit_that_is_not_reached_changes_nothing(alone: motion_memory.Memory, planner: str) -> None:
+    by = replace(alone, planner=planner)
+    free, limited, none = (by.plan(problem(1), time_limit=limit) for limit in (None, 1e6, 1e-9))
+    assert free.plan is not None
+    assert limited.plan is not None
+    assert np.array_equal(free.plan.states, limited.plan.states)
+    assert none.status == "time-spent" if none.plan is None else not alone.check(problem(1), none.plan)
+
+
+def test_an_improved_plan_is_never_driven_longer(memory: motion_memory.Memory) -> None:
+    rough = replace(memory, polished=False)
+    for by in (rough, replace(rough, assist="none")):
+        before, after = by.plan(problem(2)), by.plan(problem(2), improve_seconds=0.05)
+        assert before.plan is not None
+        assert after.plan is not None
+        assert after.plan.duration_s <= before.plan.duration_s
+        assert after.planning_seconds >= 0.05
+        assert not memory.check(problem(2), after.plan)
+
+
+@pytest.mark.parametrize("given", [-1.0, math.nan, math.inf, "1", True])
+@pytest.mark.parametrize("name", ["time_limit", "improve_seconds"])
+def test_a_time_is_a_number_of_seconds(alone: motion_memory.Memory, name: str, given: Any) -> None:
+    with pytest.raises(motion_memory.UsageError, match=name):
+        alone.plan(problem(0), **{name: given})
+    with pytest.raises(motion_memory.UsageError, match="time_limit is 0"):
+        alone.plan(problem(0), time_limit=0.0)
+
+
 def test_a_library_and_a_memory_recall_an_answer_to_any_question(
     memory: motion_memory.Memory, tmp_path: Path
 ) -> None:
@@ -125,7 +172,7 @@ def test_what_goes_wrong_is_caught_by_its_public_name(
         motion_memory.load(folder, polished="no")
     for wrong in (
         {"top_k": 2.5}, {"seed": -1}, {"seed": 1.5}, {"seed": "a"},
-        {"planner": 3}, {"planner": ["lattice"]}, {"assist": None}, {"vehicle": 3},
+        {"planner": 3}, {"planner": ["lattice"]}, {"assist": ""}, {"vehicle": 3},
     ):  # fmt: skip
         with pytest.raises(motion_memory.UsageError):
             motion_memory.load(folder, **wrong)

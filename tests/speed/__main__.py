@@ -25,6 +25,7 @@ SECTIONS: Final = {
     "kin": "tests.speed.kin",
     "peers": "tests.speed.peers.comparison",
     "assists": "tests.speed.assists",
+    "time_limits": "tests.speed.time_limits",
     "latency": "tests.speed.latency",
     "cold_clock": "tests.speed.cold_clock",
     "cold_recall": "tests.speed.cold_recall",

@@ -62,6 +62,7 @@ class Effort(NamedTuple):
 
 WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
+HURRIED: Final = 3.0  # times what they have taken: if no more time is left, other ways are left out
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
 FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the goal is used ...
@@ -156,12 +157,17 @@ def _found(
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
-        for k in list(guesses):
+        began, quickened = working_clock(), {}
+        for k in sorted(guesses, key=lambda k: guesses[k].duration_s + extras[k] * vehicle.dt):
             guess = given[k] if attempt.afresh else guesses[k]
-            guesses[k], spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
+            quicker, spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
             used += spent
-            if blocked_states(guesses[k].states, vehicle, drive.scene).mean() > effort.most_blocked:
-                del guesses[k]
+            if blocked_states(quicker.states, vehicle, drive.scene).mean() <= effort.most_blocked:
+                quickened[k] = quicker
+                now = working_clock()
+                if drive.until - now < HURRIED * (now - began):
+                    break
+        guesses = quickened
         left = {}
         costs = {k: guess.duration_s + extras[k] * vehicle.dt for k, guess in guesses.items()}
         for k in sorted(guesses, key=lambda k: costs[k]):

@@ -11,21 +11,27 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planners.maps.questions import question_in
+from planners.optimisation import polish as polish_module
+from planners.optimisation.interior import descending as descending_module
+from planners.optimisation.interior import quickest as quickest_module
 from planners.optimisation.optimise import optimise
-from planners.optimisation.polish import Polished, polish
-from planners.search.anytime import improve
-from planners.search.query import Limits
-from planners.search.registry import plan
+from planners.optimisation.polish import Polished, polish, polish_quickest
+from planners.search.anytime import asking_for_kinds, improve
+from planners.search.query import Limits, Query, usual_limits
+from planners.search.registry import PLANNERS, plan
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
+from planners.world.classes.families import family
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+from planners.world.view import View
 from planners.world.workspace import Workspace
+from tests.planners.clock import ticks
 from tests.planners.world.strategies import seeds
 from tests.worlds import box, problem_of
 
@@ -184,3 +190,27 @@ def test_improvement_profits() -> None:
     result = improve("lattice", both[0], both[1], expansions=12_000)
     assert result.plan is not None
     assert assert_arrives(both[0], result.plan).duration_s < both[1].duration_s
+
+
+def test_in_a_hurry_one_of_several_drives_is_polished_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    slot = to_canonical(family("perpendicular", "standard", CAR).draw(45, 0))[0]
+    view = View(slot, WORKSPACE)
+    rng = generator(1, "search", slot.id, "lattice")
+    asked = Query(slot, rng, view.scene, WORKSPACE, limits=usual_limits(slot))
+    found = PLANNERS["lattice"](asking_for_kinds("lattice", asked))
+    drives = sorted((other.plan for other in found.others), key=lambda drive: drive.duration_s)
+    assert len(drives) > 1
+
+    def polished_within(plans: list[Plan], seconds: float) -> tuple[Polished, float]:
+        clock = ticks(1.0)  # of the iterations of a polish, each reads the clock
+        for module in (polish_module, quickest_module, descending_module):
+            monkeypatch.setattr(module, "working_clock", clock)
+        around = slot, plans, CAR, view.scene, WORKSPACE
+        return polish_quickest(*around, seconds=seconds)[1], clock()
+
+    alone, ticked = polished_within(drives[:1], math.inf)
+    assert alone.plan is not None
+    assert alone.plan.duration_s < 0.8 * drives[0].duration_s
+    hurried, _ = polished_within(drives, ticked)
+    assert hurried.plan is not None
+    assert hurried.plan.duration_s == pytest.approx(alone.plan.duration_s, rel=0.1)
