@@ -153,6 +153,7 @@ def solve(
     improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
+    picture: Path | None = None,
     learn: Path | None = None,
     workers: int | None = None,
     options: SolveOptions = _USUAL,
@@ -168,6 +169,7 @@ def solve(
         improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
+        picture: Where to draw the first six problems and their plans, .png, .svg or .pdf; needs --plans.
         learn: Data folder that remembers new plans, those from rest to a place 50√2 m ahead.
         workers: Worker processes; default one for each core. A few problems are solved without.
         options: How the problems are solved.
@@ -175,10 +177,10 @@ def solve(
     from tasks.requests.solve_many import solve_many
 
     settings = options.settings(assist, improve_seconds, problems, time_limit=time_limit)
-    solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
+    solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts, picture)
     write_for_people(options.vehicle_line(settings, problems))
     _write_summary(solved)
-    write_files(rows=out, plans=plans)
+    write_files(rows=out, plans=plans, picture=picture)
     _write_learned(learn)
     write(*(f"watched  {line}" for line in solved.drift))
 

@@ -167,7 +167,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 solved.append(Solved(to_canonical(problem)[0], attempt))
             if request.plans is not None:
                 write_plan(
-                    _plan_path(chunk, request.plans, problem.id, chunk.problem_slice.first + number),
+                    plan_path(chunk, problem.id, number),
                     assistant.record(problem, attempt, plan),
                 )
             memory = assistant.memory_of(problem.class_name)
@@ -224,16 +224,22 @@ def plans_are_there(part: FilePart, identities: Sequence[str]) -> bool:
         part: the part.
         identities: the ids of its problems, in their order.
     """
-    folder, first = part.request.plans, part.problem_slice.first
-    return folder is None or all(
-        _plan_path(part, folder, identity, first + number).is_file()
-        for number, identity in enumerate(identities)
+    return part.request.plans is None or all(
+        plan_path(part, identity, number).is_file() for number, identity in enumerate(identities)
     )
 
 
-def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:
-    """The file of a problem's plan, named by its id if that is a safe file name, else by its number."""
+def plan_path(part: FilePart, identity: str, number: int) -> Path:
+    """The file of a problem's plan, named by its id if that is a safe file name, else by its number.
+
+    Args:
+        part: the part, of a request with a folder for plans.
+        identity: the problem's id.
+        number: its place in the part, counted from 0.
+    """
+    folder = part.request.plans
+    assert folder is not None
     is_plain = all(letter.isalnum() or letter in "-_.~" for letter in identity)
     is_safe = is_plain and not identity.startswith(".") and 0 < len(identity.encode()) <= LONGEST_FILE_NAME
-    name = identity if is_safe else f"problem+{number}"
+    name = identity if is_safe else f"problem+{part.problem_slice.first + number}"
     return folder / (f"{part.index:06d}" if part.own_folder else "") / f"{name}.json"

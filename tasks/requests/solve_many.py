@@ -34,7 +34,7 @@ from tasks.requests.problem_parts import (
     plans_are_there,
     solve_part_reporting,
 )
-from tasks.settings.checks import check_outputs
+from tasks.settings.checks import check_outputs, check_picture
 from tasks.settings.errors import UsageError, tell_faults
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ def solve_many(
     learn: Path | None = None,
     workers: int = 1,
     flow: SolveFlow | None = None,
+    drawing: Path | None = None,
 ) -> SolvedMany:
     """Solve every problem of a file, and write one attempt row each.
 
@@ -101,18 +102,24 @@ def solve_many(
         workers: number of worker processes.
         flow: solves the parts of a file in worker processes. It is called once Prefect's environment is set,
             so it may import Prefect. None solves everything in this process.
+        drawing: where to draw the first problems and their plans, which have to be written; None: nowhere.
 
     Raises:
-        UsageError: ``out`` does not end in .parquet, the settings contradict each other, or an output would
-            be written over an input.
+        UsageError: ``out`` does not end in .parquet, the settings contradict each other, an output would be
+            written over an input, or a picture is wanted without a folder for plans.
         StorageError: a problem is malformed, or two have the same id. All other parts are solved and kept,
             so once the problem is corrected the same command has little left to do.
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
+    check_picture(drawing)
+    if drawing is not None and plans is None:
+        raise UsageError(
+            f"{drawing} is to show plans, which are not kept: name a folder for them with --plans."
+        )
     assistant = Assistant(settings)  # raises UsageError early
     plan_of_one = None if plans is None else plans / f"{problems.stem}.json"  # named by the id
-    check_outputs([problems, *assistant.files], [out, plans, plan_of_one])
+    check_outputs([problems, *assistant.files], [out, plans, plan_of_one, drawing])
     if learn is not None:
         open_data_folder(learn)
     compared = settings.memory is not None and not settings.improve_seconds
@@ -125,6 +132,7 @@ def solve_many(
         key = key_of("solve", [part.key for part in parts])
         if _is_finished(request, parts, key):
             _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
+            _draw(parts, assistant, drawing)
             return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [])
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
@@ -147,8 +155,16 @@ def solve_many(
                 _LOG.info("%s held rows of other problems or options; these take their place.", out)
             join_attempts(out, [part.shard for part in parts], key)
             remove_parts(out)
+        _draw(parts, assistant, drawing)
     solved_now = sum(part.problem_slice.count for part in left) - begun
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request))
+
+
+def _draw(parts: Sequence[FilePart], assistant: Assistant, drawing: Path | None) -> None:
+    if drawing is not None:
+        from tasks.requests.solved_picture import draw_solved  # late: few commands draw
+
+        draw_solved(parts, assistant.vehicle, drawing)
 
 
 def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[PartResult]:
