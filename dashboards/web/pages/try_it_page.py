@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 from time import perf_counter
 from typing import Any, Final
 
@@ -16,13 +18,14 @@ from dashboards.world_outlines import outlines, shown_states
 from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
-from planners.search.query import Limits
+from planners.search.query import usual_limits
 from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import class_or_family, families_of
 from planners.world.classes.problem_classes import CLASSES
+from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -34,7 +37,7 @@ CHOICES: Final = ("planner", "assist", "memory")  # that come with a world
 MOST_OBSTACLES: Final = 300
 MOST_CORNERS: Final = 4_000
 SEED: Final = 1  # as `plan` has it by default
-LIMITS: Final = Limits(seconds=0.4)  # for each attempt
+MOST_SECONDS: Final = 1.5  # of an attempt: trains need most of it in yards
 REPEATS: Final = 5  # of an attempt; the median time is shown ...
 REPEAT_SECONDS: Final = 0.1  # ... of as many as fit in this
 # planner, assist, vehicle, whether to a place, whether with a library
@@ -78,6 +81,7 @@ def try_it(data: DataReader, params: Parameters) -> Page:
         "names": names,
         "another": params.also(problem=None, index=index + 1),
         "limits": {"obstacles": MOST_OBSTACLES},
+        "seconds": MOST_SECONDS,
     }
     return Page("try_it.html.jinja", "Try it", "Try it", params.run, values)
 
@@ -123,6 +127,10 @@ def _answer(
 ) -> dict[str, Any]:
     """An attempt as the editor shows it, in the world's own frame, and its plan in that of the problem."""
     own = plan and shifted(scaled(plan, problem.scale), problem.offset)
+    way = np.round(own.states[:, :2], 2).tolist() if own else []
+    cusps = cusps_of(plan, vehicle) if plan else []
+    gears = gears_of(plan, vehicle) if plan else []
+    pieces = [piece for piece in pairwise([0, *cusps, len(gears)] if plan else []) if piece[0] < piece[1]]
     return {
         "assist": use,
         "solved": attempt.solved,
@@ -132,7 +140,9 @@ def _answer(
         "nodes": attempt.nodes,
         "length_m": own.length_m if own else None,
         "duration_s": own.duration_s if own else None,
-        "way": np.round(own.states[:, :2], 2).tolist() if own else [],
+        "way": way,
+        "backwards": [way[first : last + 1] for first, last in pieces if gears[first] < 0],
+        "cusps": [way[row] for row in cusps],
         "bodies": _corners(shown_states(plan, vehicle), problem, vehicle) if plan else [],
     }
 
@@ -142,12 +152,12 @@ def _median(
 ) -> tuple[Attempt, float]:
     """An attempt, and the median milliseconds of a few: the first one may find everything cold."""
     key = (planner, assist, vehicle, canonical.arrival is None, isinstance(memory, PlanLibrary))
-    workspace = Workspace()
+    limits, workspace = replace(usual_limits(canonical), seconds=MOST_SECONDS), Workspace()
     times: list[float] = []
     began = perf_counter()
     while True:
         try:
-            attempt = solve(canonical, planner, assist, 5, memory, SEED, LIMITS, vehicle, workspace=workspace)
+            attempt = solve(canonical, planner, assist, 5, memory, SEED, limits, vehicle, workspace=workspace)
         except ValueError as error:
             raise BadRequestError(f"{error}.") from None
         if key not in _WARM:  # the first attempt of all loads what was compiled

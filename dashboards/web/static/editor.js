@@ -71,7 +71,10 @@ const draw = (focus = false) => {
       const bodies = make("g", { class: "bodies" }, flipped);
       for (const body of answer.bodies) make("polygon", { points: written(body) }, bodies);
     }
-    make("polyline", { points: written(answer.way), class: alone ? "alone-plan" : "with-plan" }, flipped);
+    const of = alone ? "alone-plan" : "with-plan";
+    make("polyline", { points: written(answer.way), class: of }, flipped);
+    for (const piece of answer.backwards) make("polyline", { points: written(piece), class: "backwards" }, flipped);
+    for (const [cx, cy] of answer.cusps) make("circle", { cx, cy, r: (xMax - xMin) / 110, class: `cusp ${of}` }, flipped);
   }
   if (isPose()) {
     const goal = item(goalItem(), "pose", flipped);
@@ -107,6 +110,7 @@ const tell = (where, answer) => {
   const facts = [["ended", answer.ended], ["checks", number(answer.checks, 0)], ["nodes", number(answer.nodes, 0)]];
   if (!answer.solved) facts.push(["took", `${number(answer.ms, 1)} ms`]);
   if (answer.length_m !== null) facts.push(["length", `${number(answer.length_m, 1)} m`], ["duration", `${number(answer.duration_s, 1)} s`]);
+  if (answer.cusps.length) facts.push(["changes of gear", number(answer.cusps.length, 0)]);
   for (const [name, fact] of facts) {
     list.append(Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: fact }));
   }

@@ -7,6 +7,7 @@ import html
 import io
 import os
 import re
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -23,10 +24,12 @@ from dashboards.web.notices import MissingError, NoticeError
 from planners.attempt import WITHOUT_MEMORY
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.memory import Memory
+from planners.world.classes.families import family
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, state_size
 from storage.archives.libraries import save_library
+from storage.exchange.problems import fields_of
 from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.watched import read_watched
@@ -179,6 +182,21 @@ def test_live_planning_answers_with_and_without_memory(client: httpx.Client) -> 
     assert alone["solved"]
     assert alone["ms"] > 0.0
     assert len(alone["way"]) > 10
+
+
+def test_live_plans_show_where_they_lead_backwards(client: httpx.Client) -> None:
+    slot = family("perpendicular", "standard", CAR).draw(45, 0)
+    world = {name: value for name, value in fields_of(slot).items() if name not in ("id", "class")}
+    asked = {"world": world, "planner": "lattice", "assist": "repair", "memory": ""}
+    (answer,) = client.post("/runs/first/plan", json=asked).json()["answers"]
+    way, cusps = answer["way"], answer["cusps"]
+    assert answer["solved"]
+    assert cusps
+    ends = [way[0], *cusps, way[-1]]
+    for piece in answer["backwards"]:
+        assert [piece[0], piece[-1]] in [list(pair) for pair in pairwise(ends)]
+        assert all(point in way for point in piece)
+    assert abs(2 * len(answer["backwards"]) - len(cusps) - 1) <= 1  # gears take turns
 
 
 def test_a_library_in_the_data_folder_can_be_chosen_by_runs_of_its_vehicle(tmp_path: Path) -> None:
