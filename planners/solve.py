@@ -38,6 +38,7 @@ from planners.world.view import View
 from planners.world.workspace import Workspace
 
 _WITH_MEMORY = ("closed", "open", "repair", "join", "published-open")
+FOR_DRIVES = 0.5  # share of the time in which stored drives are moved: the search has the other half
 ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
 
 
@@ -104,7 +105,7 @@ def solve(
         found = answer_from(
             *(memory, view, planner, top_k, seed, strategy, vehicle, assist),
             polished=polished,
-            until=view.began + limits.seconds,
+            until=view.began + FOR_DRIVES * limits.seconds,
         )
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
     if found.plan is None or found.is_long or (polished and not found.is_polished):

@@ -1,14 +1,19 @@
 """How planning ends within a limit of time: how late it is, how often it has a plan, and how good that is.
 
 ``python -m tests.speed.time_limits`` has the lattice plan for new problems, each once within each limit, with
-cold caches: places in a class, poses in slots, and a yard in which a train turns round. Driving times are
-of the problems that were solved within every limit of their line. Problems have a seed of their own.
+cold caches: places in a class, poses in slots, and a yard in which a train turns round. With ``--memory
+LIBRARY`` it plans with this library, too, for the problems of its vehicle to poses. Driving times are of the
+problems that were solved in every way of their kind. Problems have a seed of their own.
 """
 
 from __future__ import annotations
 
+import sys
+from argparse import ArgumentParser
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -16,36 +21,50 @@ from rich.console import Console
 from rich.table import Table
 
 from planners.attempt import Attempt
+from planners.memory.library.plan_library import PlanLibrary
 from planners.search.query import usual_limits
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import VEHICLES
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from planners.world.workspace import Workspace
+from storage.archives.libraries import load_library, vehicle_of
 from tasks.attempts.side_by_side import in_turn
 
 SEED: Final = 81
+TRAP: Final = "trap"
 LIMITS_S: Final = (3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.005, 0.002)
 ASKED: Final = (
-    ("trap", "car", 60, LIMITS_S[4:]),
+    (TRAP, "car", 60, LIMITS_S[4:]),
     ("perpendicular", "car", 40, LIMITS_S[2:7]),
     ("yard", "car-1-trailer", 20, LIMITS_S[1:6]),
 )
 
 
-def main() -> None:
+class Way(NamedTuple):
+    """How a problem is planned for."""
+
+    limit_s: float | None
+    memory: PlanLibrary | None
+
+
+def main(arguments: Sequence[str] = ()) -> None:
     """Print the table in this terminal."""
-    report(Console(width=150))
+    parser = ArgumentParser("python -m tests.speed.time_limits")
+    parser.add_argument("--memory", type=Path)
+    folder = parser.parse_args(arguments).memory
+    report(Console(width=150), None if folder is None else load_library(folder, vehicle_of(folder)))
 
 
-def report(console: Console) -> None:
+def report(console: Console, memory: PlanLibrary | None = None) -> None:
     """Print a line for each kind of problem and each limit."""
     table = Table(title="The lattice within limits of time", box=SIMPLE_HEAD, title_justify="left")
     for heading in (
         "problems",
         "vehicle",
+        "memory",
         "limit ms",
         "median ms",
         "90 % ms",
@@ -54,18 +73,20 @@ def report(console: Console) -> None:
         "drives s",
     ):
         table.add_column(heading, justify="right")
-    for name, vehicle, count, limits in ASKED:
-        ways = (None, *limits)
+    for name, driver, count, limits in ASKED:
+        vehicle = VEHICLES[driver]
+        ways = [Way(limit, None) for limit in (None, *limits)]
+        if memory is not None and memory.vehicle == vehicle and name != TRAP:
+            ways += [way._replace(memory=memory) for way in ways]
         attempts = _attempts([_problem(name, vehicle, i) for i in range(count)], vehicle, ways)
-        both = [all(attempts[i, way].solved for way in range(len(ways))) for i in range(count)]
-        for way, limit in enumerate(ways):
-            made = [attempts[i, way] for i in range(count)]
+        solved = [all(attempts[i, way].solved for way in range(len(ways))) for i in range(count)]
+        for number, way in enumerate(ways):
+            made = [attempts[i, number] for i in range(count)]
             took = 1e3 * np.array([attempt.planning_seconds for attempt in made])
-            drives = [
-                attempt.duration_s or 0.0 for attempt, is_both in zip(made, both, strict=True) if is_both
-            ]
+            drives = [each.duration_s or 0.0 for each, is_kept in zip(made, solved, strict=True) if is_kept]
             table.add_row(
-                *(name, vehicle, "none" if limit is None else f"{1e3 * limit:g}"),
+                *(name, driver, "none" if way.memory is None else f"{len(way.memory)} plans"),
+                "none" if way.limit_s is None else f"{1e3 * way.limit_s:g}",
                 *(f"{value:.1f}" for value in (np.median(took), np.quantile(took, 0.9), took.max())),
                 f"{sum(attempt.solved for attempt in made)} of {count}",
                 f"{np.mean(drives):.2f}" if drives else "-",
@@ -73,21 +94,27 @@ def report(console: Console) -> None:
     console.print(table)
 
 
-def _problem(name: str, vehicle: str, index: int) -> Problem:
-    if name == "trap":
+def _problem(name: str, vehicle: Vehicle, index: int) -> Problem:
+    if name == TRAP:
         return problem_class(name).draw(SEED, index)
-    return to_canonical(family(name, "standard", VEHICLES[vehicle]).draw(SEED, index))[0]
+    return to_canonical(family(name, "standard", vehicle).draw(SEED, index))[0]
 
 
 def _attempts(
-    problems: list[Problem], vehicle: str, ways: tuple[float | None, ...]
+    problems: Sequence[Problem], vehicle: Vehicle, ways: Sequence[Way]
 ) -> dict[tuple[int, int], Attempt]:
-    driven, workspace = VEHICLES[vehicle], Workspace()
+    workspace = Workspace()
 
-    def attempt(problem: Problem, way: int) -> Attempt:
-        limits, seconds = usual_limits(problem), ways[way]
+    def attempt(problem: Problem, number: int) -> Attempt:
+        seconds, memory = ways[number]
+        limits, assist = usual_limits(problem), "none" if memory is None else "repair"
         within = limits if seconds is None else replace(limits, seconds=seconds)
-        return solve(problem, "lattice", limits=within, vehicle=driven, workspace=workspace)
+        return solve(
+            *(problem, "lattice", assist, 5, memory),
+            limits=within,
+            vehicle=vehicle,
+            workspace=workspace,
+        )
 
     for way in range(len(ways)):  # anything compiled or made on first use exists before time counts
         attempt(problems[0], way)
@@ -95,4 +122,4 @@ def _attempts(
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
