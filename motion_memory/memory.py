@@ -89,7 +89,7 @@ class Memory:
 
         Raises:
             ValueError: the problem is malformed or impossible, the memory is not made for its scale, or a
-                time is none.
+                time is no possible number of seconds.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
@@ -134,7 +134,7 @@ class Memory:
 
         Raises:
             ValueError: an array has another shape, the goal is a pose and there is an arrival too, the
-                problem is impossible, or a time is none.
+                problem is impossible, or a time is no possible number of seconds.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()

@@ -19,16 +19,26 @@ def _loaded(memory: str | None, options: tuple[tuple[str, Any], ...]) -> Memory:
 
 
 @task(name="plan", persist_result=False)
-def plan_task(problem: Problem | Mapping[str, Any] | str, memory: str | None, **options: Any) -> Answer:
+def plan_task(
+    problem: Problem | Mapping[str, Any] | str,
+    memory: str | None = None,
+    *,
+    time_limit: float | None = None,
+    improve_seconds: float = 0.0,
+    **options: Any,
+) -> Answer:
     """Plan for one problem; each worker process loads a memory once.
 
     Args:
         problem: as for ``Memory.plan``.
         memory: as for ``load``.
+        time_limit: as for ``Memory.plan``.
+        improve_seconds: as for ``Memory.plan``.
         options: of ``load``, such as ``planner="gust"``.
 
     Raises:
         ValueError: The problem is malformed or impossible.
         PlanFaultError: The independent judge refuses the plan.
     """
-    return _loaded(memory, tuple(sorted(options.items()))).plan(problem)
+    planner = _loaded(memory, tuple(sorted(options.items())))
+    return planner.plan(problem, time_limit=time_limit, improve_seconds=improve_seconds)

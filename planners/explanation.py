@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import DRIVES, SUB_PLANS, Attempt
+from planners.attempt import DRIVES, Attempt
 from planners.drive_answers import DriveAnswer, drive_answer
 from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
-from planners.memory_answers import least_blocked
+from planners.memory_answers import answers_in_parts, least_blocked
 from planners.search.free_goal import aimed_view
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
@@ -128,10 +128,12 @@ def parts_found(
 
     None if whole plans of the memory are to answer the problem, or one was moved to it.
     """
-    is_whole = isinstance(memory, Memory) and is_canonical(problem) and attempt.recall != SUB_PLANS
-    if attempt.recall == DRIVES or is_whole:
+    if attempt.recall == DRIVES:
         return None
-    library = memory.library if isinstance(memory, Memory) else memory
+    if isinstance(memory, Memory):
+        if is_canonical(problem) and (attempt.recalled or not answers_in_parts(memory, problem)):
+            return None
+        memory = memory.library
     is_blind = attempt.assist.startswith("random-")
     blindly = generator(attempt.seed, "random-plans", problem.id) if is_blind else None
-    return sub_plan_answer(library, aimed_view(problem, vehicle), vehicle, blindly)
+    return sub_plan_answer(memory, aimed_view(problem, vehicle), vehicle, blindly)

@@ -75,7 +75,7 @@ def answer_from(
     use = assist.removeprefix("random-")
     usual = SUB_PLANS if isinstance(memory, PlanLibrary) else strategy or default_recall(memory)
     strategy = usual if use == assist else "random"
-    blindly = generator(seed, "random-plans", problem.id) if strategy == "random" else None
+    blindly = _blindly(seed, problem) if strategy == "random" else None
     whole = MemoryAnswer()
     if isinstance(memory, Memory) and is_canonical(problem):
         recalled = recall(memory, view, strategy, top_k, blindly)
@@ -97,11 +97,13 @@ def answer_from(
                 checks=drive.checks,
                 is_polished=True,
             )
+    blindly = blindly and _blindly(seed, problem)  # as if no whole plan had been picked
     parts = sub_plan_answer(library, view, vehicle, blindly)
+    stays_whole = parts.plan is None and bool(whole.recalled)
     answer = MemoryAnswer(
-        SUB_PLANS if blindly is None else strategy,
+        strategy if stays_whole or blindly is not None else SUB_PLANS,
         parts.plan,
-        recalled=whole.recalled if parts.plan is None else (),
+        recalled=whole.recalled if stays_whole else (),
         checks=whole.checks + drive.checks + parts.checks,
         endings=library.endings if use in JOINS and blindly is None else None,
         knows_way=parts.knows_way,
@@ -115,10 +117,14 @@ def answer_from(
 def answers_in_parts(memory: Memory, problem: Problem) -> bool:
     """Whether parts of plans are worth a look for a canonical problem to which no whole plan leads.
 
-    They are where the problem begins with another heading than the plans: turned as a whole, these lead past
-    the goal.
+    They are where the problem begins with another heading than the plans: turned as a whole, these mostly
+    lead past the goal.
     """
     return memory.heading is not None and not memory.begins_with(problem.start[2])
+
+
+def _blindly(seed: int, problem: Problem) -> np.random.Generator:
+    return generator(seed, "random-plans", problem.id)
 
 
 def least_blocked(memory: Memory, recalled: Sequence[int], view: View) -> tuple[int, int]:

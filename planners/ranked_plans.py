@@ -38,7 +38,7 @@ def ranked_plans(
 ) -> list[RankedPlan]:
     """Rank what a memory or a library has for a problem, best first.
 
-    A memory has whole plans for canonical problems: first the one that ``solve`` would return, the cheapest
+    A memory has whole plans for canonical problems: first the one that ``closed`` tries first, the cheapest
     to drive of those that are free, then those that the encoder ranks best. Where none of them is free and
     the start heading is another, and for other problems and all that are put to a library, there is one free
     plan: for a pose at rest a whole stored drive that is moved there, else parts of stored plans.

@@ -28,6 +28,7 @@ SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cos
 AGAIN = 1000  # ... and so many expansions its search at least, ...
 AS_MANY = 8  # ... so many times as many as the first one had, ...
 MOST_AGAIN = 8000  # ... and so many at most
+FOR_AGAIN = 0.5  # of the seconds left: the rest is for the polish
 LONG = 0.05  # share of its time by which a drive may take longer than was expected ...
 A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
@@ -133,10 +134,10 @@ def _searched_and_polished(
         limits = replace(
             query.limits,
             expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
-            seconds=until - working_clock(),
+            seconds=FOR_AGAIN * (until - working_clock()),
             bound_s=min(SHORTER * least_s, query.limits.bound_s),
         )
-        if limits.expansions <= 0 or limits.seconds <= 0.0:
+        if min(limits.expansions, limits.seconds) <= 0.0:
             break
         rng = generator(seed, "again", query.problem.id, planner, len(found))
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))

@@ -134,6 +134,11 @@ def is_canonical(problem: Problem) -> bool:
     return has_canonical_ends(problem) and not any(problem.start_motion) and problem.arrival is None
 
 
+def begins_straight(problem: Problem) -> bool:
+    """Whether a problem with canonical ends begins in the direction of its goal."""
+    return abs(problem.start[2] - CANONICAL_START[2]) <= _ROUNDING
+
+
 def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
     """Return the state ``[S]`` at the start: unless the problem says more, at rest and all straight.
 

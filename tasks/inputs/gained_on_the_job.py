@@ -9,8 +9,7 @@ from typing import Final, NamedTuple
 
 from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.free import START_TOLERANCE
-from planners.world.problem import CANONICAL_START, Problem, is_canonical
+from planners.world.problem import Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place
@@ -32,6 +31,9 @@ class Solved(NamedTuple):
 def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     """Add the plans of canonical problems that no memory had to a data folder.
 
+    Only problems that begin straight ahead: with one plan of another heading in it, a memory could not rank
+    any by blocked cells.
+
     Args:
         data: the data folder.
         attempts: checked attempts of one planner.
@@ -46,8 +48,7 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
         if attempt.plan is not None
         and attempt.source in NEW
         and is_canonical(problem)
-        # one plan of another heading in a memory, and cells could rank none of them
-        and abs(problem.start[2] - CANONICAL_START[2]) <= START_TOLERANCE
+        and begins_straight(problem)
     ]
     if new:
         add_gained(

@@ -93,12 +93,16 @@ class Assistant:
             check_no_recall(self.settings.recall, address, "--recall")
         return memory
 
-    def warm_up(self, problem: Problem) -> None:
+    def warm_up(self, problem: Problem, *, others: bool = False) -> None:
         """Attempt the mirror image of a problem at least once, and for ``WARM_SECONDS`` if it is quick.
 
         Code and memory are then ready, as on a robot that has planned before, but nothing of the problem
         itself is in the caches when it is attempted. If plans are to be improved, that code is made ready
         too; otherwise the first plan would spend its seconds on compiling.
+
+        Args:
+            problem: the problem.
+            others: whether others may follow, for which a memory's parts of plans are indexed, too.
         """
         canonical, alignment = to_canonical(problem)
         other = mirrored(canonical)
@@ -116,8 +120,12 @@ class Assistant:
             from_canonical(plan, alignment)
         if plan is None or not len(plan.controls):  # other problems need more
             self.attempt(EMPTY, UNASSISTED.name, seed, limits)
-        if isinstance(self.memory_of(problem.class_name), Memory) and is_canonical(other):
+        memory = self.memory_of(problem.class_name)
+        if isinstance(memory, Memory) and is_canonical(other):
             compile_free_answer(other, self.attempt, self._workspace)
+            if others:
+                x, y, heading = other.start
+                self.attempt(replace(other, start=(x, y, heading + 1.0)))
         if self.settings.improve_seconds > 0.0:
             work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
             improve(

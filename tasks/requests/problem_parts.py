@@ -161,7 +161,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 on_problem()
                 continue
             if number == before and problem.class_name not in assistant.warm_classes:
-                assistant.warm_up(problem)
+                assistant.warm_up(problem, others=True)
             attempt, plan = assistant(problem)
             if request.learn is not None:
                 solved.append(Solved(to_canonical(problem)[0], attempt))

@@ -122,7 +122,8 @@ def solve_many(
     check_outputs([problems, *assistant.files], [out, plans, plan_of_one, drawing])
     if learn is not None:
         open_data_folder(learn)
-    compared = settings.memory is not None and not settings.improve_seconds
+    as_usual = not settings.improve_seconds and settings.time_limit is None
+    compared = settings.memory is not None and as_usual
     benchmarked = _benchmarked_memory(settings.memory) if compared else None
     began = time.monotonic()
     with memory_folder(settings.memory) as memory:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from dashboards.figures.pictures import Example
 
 PICTURED: Final = 6  # problems at most
+LONGEST_ID: Final = 32  # letters, for which a picture has room
 
 
 def draw_solved(parts: Sequence[FilePart], vehicle: Vehicle, drawing: Path) -> None:
@@ -48,7 +49,7 @@ def _example(problem: Problem, record: PlanRecord, vehicle: Vehicle) -> Example:
     from dashboards.figures.pictures import Example
 
     plan = record.plan_in_frame_of(problem)
-    caption = problem.id
+    caption = problem.id if len(problem.id) <= LONGEST_ID else f"{problem.id[: LONGEST_ID - 1]}…"
     if record.plan is not None and plan is not None:
         gears = gears_told(plan_answer(record, None, None))
         caption += f"\n{plan.duration_s:.1f} s, {problem.scale * plan.length_m:.1f} m{gears}"

@@ -76,8 +76,8 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
         checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in gained_shards(gained)]
     checks += [
         partial(_library, path)
-        for path in folders_in(data.libraries)
-        if any(is_there(path / header) for header in HEADERS)
+        for path in ([] if data.is_remote else folders_in(data.libraries))  # there they are no folders
+        if any((path / header).is_file() for header in HEADERS)
     ]
     if not checks:
         raise RunError(f"{folder} does not hold a run or a library; make one with `motion-memory run`.")

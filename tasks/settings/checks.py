@@ -78,7 +78,7 @@ def check_flag(name: str, value: object) -> None:
 
 
 def check_times(time_limit: float | None, improve_seconds: float, names: tuple[str, str]) -> None:
-    """Refuse a limit of time or a time for improvement that is none.
+    """Refuse a limit of time, or a time for improvement, that is no possible number of seconds.
 
     Args:
         time_limit: seconds above 0; None is no limit.
@@ -90,9 +90,9 @@ def check_times(time_limit: float | None, improve_seconds: float, names: tuple[s
     """
     limit, improvement = names
     if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
-        raise UsageError(f"{limit} is {time_limit!r}: give more than 0 seconds.")
+        raise UsageError(f"{limit} is {time_limit!r}: give a number of seconds above 0.")
     if not (is_number(improve_seconds) and improve_seconds >= 0.0):
-        raise UsageError(f"{improvement} is {improve_seconds!r}: give 0 or more seconds.")
+        raise UsageError(f"{improvement} is {improve_seconds!r}: give a number of seconds, 0 or more.")
 
 
 def is_number(value: object) -> bool:

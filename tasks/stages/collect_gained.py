@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from planners.world.problem import begins_straight
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.places.data_folder import open_data_folder
@@ -37,6 +38,7 @@ def collect_gained_chunk(chunk: Chunk) -> None:
         candidate
         for gained in read_searched(snapshot, rows, chunk.vehicle)
         if gained.experience.problem.id not in tested
+        and begins_straight(gained.experience.problem)  # earlier versions kept others, too
         for candidate in candidates_of_gained(gained, settings, chunk.vehicle, workspace)
     ]
     write_searched(chunk.shard("learned"), made, chunk.key, chunk.vehicle)

@@ -37,7 +37,7 @@ CHOICES: Final = ("planner", "assist", "memory")  # that come with a world
 MOST_OBSTACLES: Final = 300
 MOST_CORNERS: Final = 4_000
 SEED: Final = 1  # as `plan` has it by default
-MOST_SECONDS: Final = 1.5  # of an attempt: trains need most of it in yards
+MOST_SECONDS: Final = 1.5  # of an attempt: trains need up to a second in yards
 REPEATS: Final = 5  # of an attempt; the median time is shown ...
 REPEAT_SECONDS: Final = 0.1  # ... of as many as fit in this
 # planner, assist, vehicle, whether to a place, whether with a library
@@ -128,9 +128,9 @@ def _answer(
     """An attempt as the editor shows it, in the world's own frame, and its plan in that of the problem."""
     own = plan and shifted(scaled(plan, problem.scale), problem.offset)
     way = np.round(own.states[:, :2], 2).tolist() if own else []
-    cusps = cusps_of(plan, vehicle) if plan else []
-    gears = gears_of(plan, vehicle) if plan else []
-    pieces = [piece for piece in pairwise([0, *cusps, len(gears)] if plan else []) if piece[0] < piece[1]]
+    cusps = [] if plan is None else list(cusps_of(plan, vehicle))
+    gears = [] if plan is None else gears_of(plan, vehicle).tolist()
+    pieces = list(pairwise([0, *cusps, len(gears)])) if gears else []
     return {
         "assist": use,
         "solved": attempt.solved,

@@ -62,7 +62,7 @@ class Effort(NamedTuple):
 
 WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
-HURRIED: Final = 3.0  # times what they have taken: if no more time is left, other ways are left out
+HURRIED: Final = 3.0  # no further way is tried once less is left than so many times what those so far took
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
 FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the goal is used ...

@@ -55,7 +55,7 @@ COMMANDS = (
         (["plan", "p.json", "--planner", "prm"], 2, '"prm" for --planner. Choose from'),
         (["plan", "p.json", "--assist", "magic"], 2, '"magic" for --assist. Choose from'),
         (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
-        (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
+        (["plan", "p.json", "--improve-seconds", "-1"], 2, "0 or more"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
         (["plan", "p.json"], 1, "p.json does not exist"),
         (["draw", "maze", "--out", "p.jsonl"], 2, '"maze" for NAME. Choose from'),
