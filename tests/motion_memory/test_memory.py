@@ -147,7 +147,7 @@ def test_threads_do_not_disturb_each_other(planner: Memory) -> None:
     wrong: list[int] = []
 
     def ask(i: int) -> None:
-        wrong.extend(i for _ in range(50) if not same(planner.plan(problem(i)), alone[i]))
+        wrong.extend(i for _ in range(15) if not same(planner.plan(problem(i)), alone[i]))
 
     threads = [Thread(target=ask, args=(i,)) for i in range(COUNT)]
     for thread in threads:

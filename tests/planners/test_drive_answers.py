@@ -145,7 +145,7 @@ def test_drives_picked_blindly_answer_less(slots: PlanLibrary) -> None:
 
 
 def test_trains_turn_round_as_others_did() -> None:
-    library = library_of("yard", "easy", 8, CAR_1_TRAILER)
+    library = library_of("yard", "easy", 4, CAR_1_TRAILER)
     moved = 0
     for number in range(4):
         problem = drawn("yard", "easy", 6, number, CAR_1_TRAILER)

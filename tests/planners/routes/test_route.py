@@ -250,13 +250,25 @@ CREATE = read_vehicle(Path("docs/vehicles/create3.yaml"))
 STREET = (5.0, 25.0, -0.5 * math.pi)
 
 
-@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE, CREATE], ids=["car", "differential", "create3"])
+# Widths, depths and angles of slots: the car is led into all, the others into two each.
+SLOTS = ((1.3, 2.3, 1.57), (1.6, 2.3, 1.05), (2.0, 2.6, 0.79), (1.4, 5.0, 1.57), (1.4, 9.0, 1.57))
+INTO = {
+    "car": (CAR, SLOTS),
+    "differential": (DIFFERENTIAL_DRIVE, SLOTS[2::2]),
+    "create3": (CREATE, SLOTS[1::2]),
+}
+
+
 @pytest.mark.parametrize(
-    ("width", "depth", "angle"),
-    [(1.3, 2.3, 1.57), (1.6, 2.3, 1.05), (2.0, 2.6, 0.79), (1.4, 5.0, 1.57), (1.4, 9.0, 1.57)],
+    ("vehicle", "width", "depth", "angle"),
+    [
+        pytest.param(vehicle, *slot, id="-".join(map(str, (name, *slot))))
+        for name, (vehicle, slots) in INTO.items()
+        for slot in slots
+    ],
 )
 def test_routes_lead_into_slots_of_any_kind_and_out_of_them(
-    width: float, depth: float, angle: float, vehicle: Vehicle
+    vehicle: Vehicle, width: float, depth: float, angle: float
 ) -> None:
     ahead, backwards = (in_slot(depth, angle, vehicle, each) for each in (False, True))
     out = Stop((5.0, 5.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,7 @@ from storage.vehicles.vehicle_files import read_vehicle
 from tests.worlds import problem_of, strewn
 
 HUNTER = read_vehicle(Path("docs/vehicles/hunter.yaml"))
+DEAR_BACKWARDS = Costs(gear_change=0.0, forwards=1.0, backwards=3.0)
 
 
 def costing(vehicle: Vehicle, gear_change: float, forwards: float, backwards: float) -> Vehicle:
@@ -46,28 +48,31 @@ def seconds_backwards(plan: Plan, vehicle: Vehicle) -> float:
     return float((gears_of(plan, vehicle) < 0).sum() * plan.dt)
 
 
-def questions(vehicle: Vehicle, count: int) -> list[Problem]:
-    """Questions for poses at rest, from rest or in motion."""
-    worlds = problem_class("random", vehicle=vehicle)
-    asked = [question_in(worlds.draw(44, i), i, 44, vehicle, True) for i in range(count)]
-    return [to_canonical(each)[0] for each in asked if each is not None]
+@cache
+def answer(vehicle: Vehicle, costs: Costs, number: int) -> Plan | None:
+    """The plan for a question for a pose, from rest or in motion; None where there is no room for one."""
+    world = problem_class("random", vehicle=vehicle).draw(44, number)
+    asked = question_in(world, number, 44, vehicle, True)
+    return None if asked is None else driven(to_canonical(asked)[0], vehicle._replace(costs=costs))
+
+
+def answers(vehicle: Vehicle, costs: Costs, count: int) -> list[Plan]:
+    return [plan for i in range(count) if (plan := answer(vehicle, costs, i)) is not None]
 
 
 def test_who_pays_for_driving_backwards_drives_forwards_mostly() -> None:
-    paying = costing(HUNTER, 0.0, 1.0, 3.0)
-    asked = questions(HUNTER, 8)
     usual, forwards = (
-        sum(seconds_backwards(driven(each, vehicle), vehicle) for each in asked)
-        for vehicle in (HUNTER, paying)
+        sum(seconds_backwards(plan, HUNTER) for plan in answers(HUNTER, costs, 8))
+        for costs in (HUNTER.costs, DEAR_BACKWARDS)
     )
     assert 0.0 < forwards < 0.5 * usual
 
 
 @pytest.mark.parametrize("vehicle", [HUNTER, DIFFERENTIAL_DRIVE, CAR_1_TRAILER])
 def test_no_answer_costs_more_than_the_one_of_who_does_not_pay(vehicle: Vehicle) -> None:
-    paying = costing(vehicle, 0.0, 1.0, 3.0)
-    plans = [(driven(each, vehicle), driven(each, paying)) for each in questions(vehicle, 8)]
-    for pair in plans:
+    paying = vehicle._replace(costs=DEAR_BACKWARDS)
+    pairs = zip(*(answers(vehicle, costs, 8) for costs in (vehicle.costs, DEAR_BACKWARDS)), strict=True)
+    for pair in pairs:
         without, paid = (cost_of(plan, paying) for plan in pair)
         assert paid <= without
 
@@ -83,11 +88,11 @@ def test_a_robot_that_pays_for_driving_forwards_drives_backwards() -> None:
 
 
 def test_changes_of_gear_that_save_little_are_left_out() -> None:
-    changes = []
-    for vehicle in (HUNTER, costing(HUNTER, 5.0, 1.0, 1.0)):
-        plans = [driven(each, vehicle) for each in questions(HUNTER, 12)]
-        changes.append(sum(len(cusps_of(plan, vehicle)) for plan in plans))
-    assert changes[1] < changes[0]
+    usual, fewer = (
+        sum(len(cusps_of(plan, HUNTER)) for plan in answers(HUNTER, costs, 10))
+        for costs in (HUNTER.costs, Costs(gear_change=5.0))
+    )
+    assert fewer < usual
 
 
 def test_slots_are_solved_as_often_by_who_pays() -> None:

@@ -30,7 +30,7 @@ from tests.planners.clock import ticks
 from tests.storage.samples import problem_with
 
 ROOT = Path(__file__).parents[3]
-WRITERS = 3
+WRITERS = 2
 
 
 def experience(number: int, identity: str = "", class_name: str = "curves") -> Experience:

@@ -134,6 +134,7 @@ def test_a_repeated_command_does_nothing_and_tells_the_same(
 def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pieces, "PIECE", 4)
     monkeypatch.setattr(gather, "FEW_PLANS", 0)
+    monkeypatch.setattr(gather, "part_workers", lambda *_: nullcontext())  # they would have nothing to do
     done: list[int] = []
 
     def backwards(some: Sequence[pieces.GatherPiece]) -> list[pieces.Gathered]:
@@ -151,10 +152,8 @@ def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pyt
         flow = partial(pieces.gather_pieces, do=backwards)
         gather.gather(["random"], out, 14, 0.5, "easy", ImportSettings(), workers, flow)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(gather, "part_workers", lambda *_: nullcontext())  # they would have nothing to do here
-        with pytest.raises(KeyboardInterrupt):
-            gathered("interrupted", workers=2)
+    with pytest.raises(KeyboardInterrupt):
+        gathered("interrupted", workers=2)
     damaged = done[0]  # in the middle of its rows, and then what is kept beside it
     (shard,) = (tmp_path / "interrupted.parts").glob(f"{damaged:06d}.parquet")
     shard.write_bytes(shard.read_bytes()[:200] + bytes(60) + shard.read_bytes()[260:])
@@ -265,6 +264,7 @@ def test_a_name_is_a_family_and_a_path_is_a_folder_whatever_folders_there_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pieces, "PIECE", 1)
     asked = ["gather", "lot", "--plans", "1", "--poses", "1", "--workers", "1", "--out"]
     assert call([*asked, "before"]) == 0
     assert capsys.readouterr().err.count("./lot") == 0
@@ -282,6 +282,7 @@ def test_a_library_may_be_called_like_the_family_it_was_gathered_of(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pieces, "PIECE", 1)
     for _ in range(2):
         assert call(["gather", "lot", "--plans", "1", "--workers", "1", "--out", "lot"]) == 0
 

@@ -100,7 +100,7 @@ def dijkstra_length(solid, goal) -> float:
 
 
 @given(seed=SEEDS, count=st.integers(0, 40))
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_the_shortest_way_is_dijkstras_and_keeps_clear(seed, count):
     obstacles = boxes(generator(seed), count)
     solid = polygons_of(obstacles)
