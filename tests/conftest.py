@@ -24,10 +24,10 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "strict"))
 TESTS: Final = Path(__file__).parent
 LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/studies/code.md)
     "flows/test_run.py",
-    "tasks/servers/test_prefect_server.py",
-    "flows/cli/test_closed_commands.py",
     "tasks/champions/test_conclude.py",
+    "tasks/servers/test_prefect_server.py",
     "tasks/fan_out/test_fan_out.py",
+    "flows/cli/test_closed_commands.py",
     "tasks/serving/test_serve_memory.py",
     "dashboards/web/test_browser.py",
     "tasks/tracking/test_memory_model.py",
@@ -69,14 +69,15 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let each process begin with some of the longest files: short tests then fill what is left at the end.
 
-    Each of n processes is given the next n-th of the tests, and takes from the others when it is done.
+    Each of n processes is given the next n-th of the tests, and takes from the others when it is done. Who
+    needs the small run is with those for whom it is made, as any other process would only wait for it.
     """
     processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     files: dict[Path, list[pytest.Item]] = {TESTS / name: [] for name in LONGEST}
-    short = [item for item in items if item.path not in files]
+    short: list[pytest.Item] = []
     for item in items:
-        if item.path in files:
-            files[item.path].append(item)
+        needs_run = "small_runs" in getattr(item, "fixturenames", ())
+        files.get(TESTS / "flows/test_run.py" if needs_run else item.path, short).append(item)
     share = -(-len(items) // processes)
     ordered: list[pytest.Item] = []
     for process in range(processes):

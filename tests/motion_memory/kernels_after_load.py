@@ -41,11 +41,15 @@ def questions(vehicle: Vehicle) -> Iterator[Problem]:
             yield family(name, difficulty, vehicle).draw(SEED, 0)
 
 
-def kernels() -> Counter[str]:
+def all_kernels() -> list[Dispatcher]:
+    """All kernels that were defined so far; to find them takes as long as to answer a question."""
+    return [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+
+
+def ready(kernels: list[Dispatcher]) -> Counter[str]:
     """How many versions of each kernel are ready."""
-    ready = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
     versions: Counter[str] = Counter()
-    for each in ready:
+    for each in kernels:
         versions[f"{each.py_func.__module__}.{each.py_func.__name__}"] += len(each.overloads)
     return versions
 
@@ -53,11 +57,14 @@ def kernels() -> Counter[str]:
 if __name__ == "__main__":
     memory = load(sys.argv[1])
     asked = list(questions(memory.vehicle))  # which needs kernels of its own
-    before = kernels()
+    kernels = all_kernels()
+    before = ready(kernels)
     print(f"{before.total()} kernels")
     for question in asked:
         memory.plan(question)
-        after = kernels()
+        after = ready(kernels)
         if new := after - before:
             print(question.id, *new)
         before = after
+    if new := ready(all_kernels()) - before:
+        print("defined only then:", *new)

@@ -7,15 +7,18 @@ import re
 import shutil
 import signal
 from pathlib import Path
+from unittest.mock import Mock
 
 import httpx
 import pytest
 
+from flows.cli.main import call
 from storage.exchange.problems import fields_of
 from storage.places.data_folder import DataFolder
 from storage.tables.attempts import read_attempts
 from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
+from tasks.session import command_session
 from tests.flows import small_run
 from tests.flows.closed import assert_closed, assert_nowhere_in
 from tests.flows.conftest import SmallRuns
@@ -35,6 +38,18 @@ from tasks.requests import problem_parts, solve_many
 problem_parts.PART_PROBLEMS = 1
 solve_many.FEW_PROBLEMS = 0  # even so few are left to workers
 main()
+"""
+KILLED = f"""
+import os, signal
+from tasks.requests import solve_many
+
+def solve_or_die(part, told, solve=solve_many.solve_part_reporting):
+    if part.index == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return solve(part, told)
+
+solve_many.solve_part_reporting = solve_or_die
+{PARTS_OF_ONE}
 """
 
 
@@ -56,26 +71,46 @@ def test_a_run_and_what_it_leaves(small_runs: SmallRuns) -> None:
     assert_nowhere_in(small_runs.two.path.parents[1])
 
 
-@pytest.mark.timeout(600)
-def test_failing_stages_tell_no_secret(small_runs: SmallRuns, place: Path) -> None:
-    data = place / "data"
+@pytest.fixture
+def of_small_run(small_runs: SmallRuns, tmp_path: Path) -> tuple[Path, list[str]]:
+    """A copy of the small run's data folder, and the options of a command on it."""
+    data = tmp_path / "data"
     shutil.copytree(small_runs.two.path.parents[1], data)
-    options = [*small_run.OPTIONS, "--data", str(data), "--workers", "1"]
+    return data, [*small_run.OPTIONS, "--data", str(data), "--workers", "1"]
+
+
+@pytest.mark.timeout(600)
+def test_a_failing_stage_tells_no_secret(of_small_run: tuple[Path, list[str]], tmp_path: Path) -> None:
+    data, options = of_small_run
     (run,) = DataFolder(data).runs()
     masks = run.memory("random") / "masks.npy"
     masks.write_bytes(masks.read_bytes()[:-1] + b"x")
     run.shard("results", "random", 0).unlink()  # so that a worker reads the memory
-    failed = watch(["benchmark", *options], place / "failed.log", PLANTED)
+    failed = watch(["benchmark", *options], tmp_path / "failed.log", PLANTED)
     assert failed.code == 1
     assert "masks.npy is damaged" in failed.output
     assert SECRET not in failed.output
-    unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "0"}
-    failed = watch(["report", *options], place / "mlflow.log", unreached)
-    assert failed.code == 1
-    assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
-    assert "Traceback" not in failed.output
-    assert SECRET not in failed.output
-    assert failed.ports == set()  # told before a server or a cluster is started
+    assert_nowhere_in(data)
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.filterwarnings("ignore")  # of MLflow's libraries among themselves
+def test_an_mlflow_that_cannot_be_used_is_told_first_and_without_its_secret(
+    of_small_run: tuple[Path, list[str]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, options = of_small_run
+    unreached = IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "0"}
+    for name, value in (PLANTED | unreached).items():
+        monkeypatch.setenv(name, value)
+    begun = Mock()  # a server, or a cluster
+    for what in ("local_server", "_workers_for"):
+        monkeypatch.setattr(command_session, what, begun)
+    assert call(["report", *options]) == 1
+    told = "".join(capsys.readouterr())
+    assert "MLflow at http://***@127.0.0.1:9 cannot be used" in told
+    assert "Traceback" not in told
+    assert SECRET not in told
+    begun.assert_not_called()
     assert_nowhere_in(data)
 
 
@@ -83,18 +118,14 @@ def test_failing_stages_tell_no_secret(small_runs: SmallRuns, place: Path) -> No
 def test_a_killed_solve_goes_on_with_two_workers_to_the_same_rows(place: Path) -> None:
     problems, out = place / "many.jsonl", place / "solved" / "rows.parquet"
     parts = with_prefect_database(out.with_name("rows.parquet.parts"))
-    arguments = ["solve", str(problems), "--out", str(out), "--workers", "2", "--planner", "gust"]
-
-    def some_are_done(_: str) -> bool:
-        return len(list(parts.glob("[0-9]*.parquet"))) > 1
-
-    watch(arguments, place / "killed.log", PLANTED, some_are_done, PARTS_OF_ONE, signal.SIGKILL)
-    assert list(parts.glob("[0-9]*.parquet"))
-    watched = watch(arguments, place / "solve.log", PLANTED, script=PARTS_OF_ONE)
+    arguments = ["solve", str(problems), "--out", str(out), "--planner", "gust", "--workers"]
+    killed = watch([*arguments, "1"], place / "killed.log", PLANTED, script=KILLED)
+    assert killed.code == -signal.SIGKILL
+    assert len(list(parts.glob("[0-9]*.parquet"))) == 2
+    watched = watch([*arguments, "2"], place / "solve.log", PLANTED, script=PARTS_OF_ONE)
     assert watched.code == 0, watched.output[-2000:]
     assert f"{COUNT} of {COUNT}" in watched.output
-    # who comes soon after the killed command uses its server, which is no process of its own
-    assert {port.process for port in watched.ports} >= {"command", "child"}
+    assert {port.process for port in watched.ports} == {"server", "command", "child"}
     assert_closed("solve", watched)
     assert_nowhere_in(place)
     solve_many(AssistantSettings("gust", "none", 5, None, 1), problems, place / "undisturbed.parquet")

@@ -47,8 +47,7 @@ class Story:
         self.taken_over(patch)
         self.rolled_back()
         self.unreachable(patch)
-        self.crash(patch)
-        self.approval()
+        self.crash_and_approval(patch)
         verify_folder(Path(self.data), 0.05, 1)  # raises where something is wrong
 
     def first_champion_and_a_better_one(self) -> None:
@@ -120,8 +119,8 @@ class Story:
             self.seen["unreachable said"] = refused(lambda: retrain(self.data))
         self.seen["unreachable"] = self.state()
 
-    def crash(self, patch: pytest.MonkeyPatch) -> None:
-        """In the last moment before the alias, the champion's run being gone, too."""
+    def crash_and_approval(self, patch: pytest.MonkeyPatch) -> None:
+        """A crash in the last moment before an alias, the champion's run being gone, too; then approval."""
         remove_folder(run_folder(self.data, RunSettings.from_json(self.seen["first"])).path)
 
         def die(*_: Any) -> None:
@@ -129,17 +128,11 @@ class Story:
 
         with patch.context() as without, contextlib.suppress(KeyboardInterrupt):
             without.setattr(task, "log_judgement", die)
-            retrain(self.data)
+            retrain(self.data, approve=True)
         self.seen["crashed"] = self.state()
         learn(self.data, seed=904, count=3)  # what comes meanwhile waits for the next time
-        (made,) = retrain(self.data)
-        self.seen["went on"] = self.state() | {"learned": made.learned}
-
-    def approval(self) -> None:
-        learn(self.data, seed=905, count=24)
-        roll_back_to_first(self)
-        retrain(self.data, approve=True)
-        self.seen["awaiting"] = self.state()
+        (made,) = retrain(self.data, approve=True)
+        self.seen["awaiting"] = self.state() | {"learned": made.learned}
         promote_awaiting(Path(self.data), CLASS)
         self.seen["approved"] = self.state()
         self.seen["approved twice"] = refused(lambda: promote_awaiting(Path(self.data), None))
@@ -161,12 +154,6 @@ class Story:
         """All files but MLflow's own, which it opens to read, too."""
         found = [path for path in Path(self.data).rglob("*") if "mlflow.db" not in path.name]
         return {str(path): path.stat().st_mtime_ns for path in found}
-
-
-def roll_back_to_first(story: Story) -> None:
-    """However many promotions there were."""
-    while story.state()["champion"] != 1:
-        roll_back(Path(story.data), CLASS)
 
 
 def said(call: Any) -> str:

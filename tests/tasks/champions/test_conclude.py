@@ -23,6 +23,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages import build_memory, hallucinate
 from tasks.stages.judge import judged
 from tasks.tracking import mlflow_runs
+from tests.prepared.mlflow_database import with_mlflow_database
 from tests.tasks.champions.retrained import CLASS, SETTINGS, timed_by_work
 from tests.tasks.champions.retraining_story import Story
 
@@ -55,6 +56,7 @@ def story(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Iterator[
             patch.setattr(side_by_side, "solve", timed_by_work)
             patch.setattr(build_memory, "_draw", lambda *_: None)  # seconds of pictures
             patch.setattr(report, "save", lambda *_: None)
+            with_mlflow_database(Path(told.data))
             told.tell(patch)
             seen.write_text(json.dumps(told.seen))
         told.seen = json.loads(seen.read_text())
@@ -141,11 +143,12 @@ def test_a_registry_that_cannot_be_reached_is_one_line_and_changes_nothing(story
 
 
 def test_a_crash_leaves_the_champion_and_the_same_command_goes_on(story: Story) -> None:
-    crashed, after = story.seen["crashed"], story.seen["went on"]
+    crashed, after = story.seen["crashed"], story.seen["awaiting"]
     assert crashed["champion"] == 1
     assert len(after["versions"]) == len(crashed["versions"])  # what the crash left was found again
     assert _last(after)["learned"] == after["learned"] == _last(crashed)["learned"]
-    assert _last(after)["verdict"] in (PROMOTED, REFUSED)
+    assert "verdict" not in _last(crashed)
+    assert _last(after)["verdict"] == AWAITING
 
 
 def test_a_challenger_awaits_approval_where_it_should(story: Story) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from tasks.registry.champion_registry import (
 )
 from tasks.settings.errors import RunError
 from tasks.settings.presets import for_preset
+from tests.prepared.mlflow_database import with_mlflow_database
 from tests.storage.samples import a_memory
 
 NAME = "motion-memory-trap"
@@ -39,16 +41,15 @@ pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
 class Registered:
     """A data folder with one logged memory, of which any number of versions can be made."""
 
-    def __init__(self, place: Path) -> None:
-        from tasks.tracking.mlflow_runs import Tracker
+    def __init__(self, data: Path, run_id: str, model_id: str) -> None:
+        self.data, self.run_id, self.model_id = data, run_id, model_id
+        self.registry = Registry(open_data_folder(data))
 
-        self.data = place / "data"
-        folder = open_data_folder(self.data)
-        save_memory(place / "archive", a_memory(3))
-        tracker = Tracker(folder)
-        with tracker.run("r", "train trap", {}) as self.run_id:
-            self.model_id = tracker.memory(self.run_id, "memory", place / "archive", "car")
-        self.registry = Registry(folder)
+    def copied(self, data: Path) -> Registered:
+        """The same in another data folder; the memory's own files stay where they were logged."""
+        copy = open_data_folder(data).mlflow_database
+        shutil.copyfile(open_data_folder(self.data).mlflow_database, copy)
+        return Registered(data, self.run_id, self.model_id)
 
     def version(self, key: str, name: str = NAME, **tags: Any) -> Version:
         tags = {"memory": "trap"} | tags
@@ -60,10 +61,25 @@ class Registered:
         return found and found.number
 
 
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory: pytest.TempPathFactory) -> Registered:
+    """The memory is logged once; no version is made of it here."""
+    from tasks.tracking.mlflow_runs import Tracker
+
+    place = tmp_path_factory.mktemp("logged")
+    save_memory(place / "archive", a_memory(3))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MLFLOW_TRACKING_URI", raising=False)
+        tracker = Tracker(open_data_folder(with_mlflow_database(place / "data")))
+        with tracker.run("r", "train trap", {}) as run_id:
+            model_id = tracker.memory(run_id, "memory", place / "archive", "car")
+        return Registered(place / "data", run_id, model_id)
+
+
 @pytest.fixture
-def registered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registered:
+def registered(logged: Registered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registered:
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
-    return Registered(tmp_path)
+    return logged.copied(tmp_path / "data")
 
 
 def test_a_registry_that_is_not_there_holds_nothing_and_is_not_made(tmp_path: Path) -> None:
@@ -215,10 +231,10 @@ def test_a_rollback_of_which_one_part_cannot_be_done_changes_nothing(registered:
 
 
 def test_a_registry_that_was_opened_before_anything_was_logged_sees_what_is_registered(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    logged: Registered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     early = Registry(open_data_folder(tmp_path / "data"))
     assert early.names() == []
-    Registered(tmp_path).version("one")
+    logged.copied(tmp_path / "data").version("one")
     assert early.names() == [NAME]

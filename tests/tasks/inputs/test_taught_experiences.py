@@ -18,6 +18,7 @@ from tasks.inputs import taught_experiences as growth
 from tasks.settings import run_settings as settings
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import COMBINED
+from tasks.stages import build_memory
 from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.hallucinate import HALLUCINATE
@@ -44,6 +45,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(settings, "TAUGHT", TAUGHT)
         patch.setattr(growth, "READ_OUT_PROBLEMS", 20)
+        patch.setattr(build_memory, "_draw", lambda *_: None)  # seconds of pictures
         collect(data, SETTINGS)
         for stage in (HALLUCINATE, RELABEL, TRAIN, BUILD_MEMORY, MEASURE_RECALL, BENCHMARK):
             run_stage(stage, data, SETTINGS)

@@ -37,6 +37,7 @@ from tasks.registry.model_uris import load_from
 from tasks.registry.register_library import register_library
 from tasks.settings.errors import RunError
 from tests import worlds
+from tests.prepared.mlflow_database import with_mlflow_database
 from tests.storage.samples import a_memory
 
 ROOT = Path(__file__).parents[3]
@@ -56,7 +57,7 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
     from tasks.tracking.mlflow_runs import Tracker
 
-    data = tmp_path_factory.mktemp("mlflow") / "data"
+    data = with_mlflow_database(tmp_path_factory.mktemp("mlflow") / "data")
     found = [solve(EASY.draw(901, i), "follow").plan for i in range(12)]
     plans = tuple(plan for plan in found if plan is not None)
     sweeps = sweep_plans(plans)
@@ -111,7 +112,7 @@ def test_a_library_is_registered_once_and_loaded_by_its_address(
     library = gathered_library("random", CAR, [(str(i), plan) for i, plan in enumerate(plans)])
     folder = tmp_path / "library"
     save_library(folder, library)
-    monkeypatch.setenv("MOTION_MEMORY_DATA", str(tmp_path / "data"))
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(with_mlflow_database(tmp_path / "data")))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     named = [register_library("docks", folder, CAR, {"sources": "random"}, {"plans": 12}) for _ in range(2)]
     assert named == ["models:/docks/1", "models:/docks/1"]
@@ -144,6 +145,7 @@ def test_without_an_mlflow_the_line_says_how_to_name_one(
         load_from("models:/mine/1", CAR)
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")  # where nobody answers
+    monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
     with pytest.raises(RunError, match=r"cannot be fetched from MLflow at http://127.0.0.1:9") as error:
         load_from("models:/mine/1", CAR)
     assert "\n" not in str(error.value)
