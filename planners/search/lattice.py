@@ -69,8 +69,8 @@ class LatticeSettings(NamedTuple):
 NOWHERE = place(0.0, 0.0, 0.0)
 TRIALS = 4  # for which expansions are left in any case
 KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for their polish, ...
-KEPT_OF_FEW = 0.75  # ... and if they are few ...
-ENOUGH_S = 1.0  # ... at most so many
+KEPT_OF_FEW = 0.75  # ... or this share of few seconds, but then ...
+ENOUGH_S = 1.0  # ... no more than so many
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:

@@ -25,8 +25,8 @@ Grow = Callable[[trees.Tree, Floats, int], None]  # tree, goal, number of expans
 GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
 _FIRST = (Status.BUDGET_SPENT, Status.START_BLOCKED, Status.GOAL_BLOCKED, Status.SOLVED)
 SLICE = 256  # expansions between two looks at the clock: a few milliseconds
-SHORT_S = 1.0  # in so few seconds ...
-SHORT_SLICE = 16  # ... it is looked at the clock after so few
+SHORT_SLICE = 16  # the same where no more than ...
+SHORT_S = 1.0  # ... so many seconds are given
 
 
 @lean
@@ -71,7 +71,7 @@ def attempt(
         is_enclosed: whether nothing leads away from the goal, so that the search ends.
     """
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
-    began, most = working_clock(), SLICE if limits.seconds > SHORT_S else SHORT_SLICE
+    began, slice_ = working_clock(), SLICE if limits.seconds > SHORT_S else SHORT_SLICE
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
     goal = goal_of(problem, vehicle)
     prefix = prefix_of(query)
@@ -108,7 +108,7 @@ def attempt(
                 extend_tree = explore if explore is not None and explores else grow
                 if extend_tree is grow:
                     prepare(tree, goal, trial)
-            until = min(int(counts[trees.EXPANSIONS]) + most, restart_at, limits.expansions)
+            until = min(int(counts[trees.EXPANSIONS]) + slice_, restart_at, limits.expansions)
             extend_tree(tree, goal, until)
             if counts[trees.EXPANSIONS] < until:
                 restart_at = int(counts[trees.EXPANSIONS])  # nothing is left to extend
