@@ -218,7 +218,9 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         raise ValueError(f"is {type(fields).__name__}, expected an object with {', '.join(_REQUIRED)}")
     check_problem_fields(list(fields))
     if fields.get(MOVING) not in (None, []):
-        raise ValueError("has obstacles in 'moving', but what moves is not supported; leave them out")
+        raise ValueError(
+            f"has 'moving' {short(fields[MOVING])}, but what moves is not supported; leave it out"
+        )
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")

@@ -113,6 +113,8 @@ def solve_many(
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
     check_picture(drawing)
+    if plans is not None and (plans == out or (plans.exists() and not plans.is_dir())):
+        raise UsageError(f"{plans} is to be a folder for plans, but it is a file: give another name.")
     if drawing is not None and plans is None:
         raise UsageError(
             f"{drawing} is to show plans, which are not kept: name a folder for them with --plans."

@@ -35,7 +35,8 @@ def draw_solved(parts: Sequence[FilePart], vehicle: Vehicle, drawing: Path) -> N
     examples = [_example(*each, vehicle) for each in islice(_solved(parts, vehicle), PICTURED)]
     count = sum(part.problem_slice.count for part in parts)
     shown = f"The first {len(examples)} of {count:,} problems" if len(examples) < count else "Problems"
-    save_picture(gallery(examples, f"{shown} and their plans"), drawing)
+    title = f"{shown} and their plans" if count > 1 else "A problem and its plan"
+    save_picture(gallery(examples, title), drawing)
 
 
 def _solved(parts: Sequence[FilePart], vehicle: Vehicle) -> Iterator[tuple[Problem, PlanRecord]]:

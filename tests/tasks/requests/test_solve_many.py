@@ -175,6 +175,9 @@ def test_the_first_problems_and_their_plans_are_drawn(
             assert not faults(example.problem, example.answer)
     with pytest.raises(UsageError, match="--plans"):
         solve_many(ASSISTANT, problems, rows, drawing=drawing)
+    for file in (problems, tmp_path / "new.parquet"):
+        with pytest.raises(UsageError, match="is a file"):
+            solve_many(ASSISTANT, problems, tmp_path / "new.parquet", file)
 
 
 def test_rows_come_in_the_order_of_the_problems(undisturbed: pd.DataFrame, problems: Path) -> None:
