@@ -20,8 +20,8 @@ smoke: $(READY)  ## the same, tiny: about a minute
 prepared: $(PLANNING)  ## what the tests share: compiled kernels
 	$(BIN)/python -m tests.prepared
 
-test: $(READY) prepared  ## the test suite, in parallel: three processes for two cores, as many tests wait
-	$(BIN)/pytest -n 3 --dist worksteal -q
+test: $(READY) prepared  ## the test suite, in parallel: a process for each of two cores
+	$(BIN)/pytest -n 2 --dist worksteal -q
 
 test-slow: $(READY) prepared  ## the tests that take minutes
 	$(BIN)/pytest -m slow -q --timeout 3600
