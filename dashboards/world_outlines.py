@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from planners.world.arrays import Flags, Floats, Point
-from planners.world.driving_cost import cusps_of, gears_of
+from planners.world.driving_cost import runs_of
 from planners.world.geometry.collision import Scene, blocked_states
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.bodies import footprints
@@ -126,9 +125,8 @@ def travel_arrows(
     which a metre is ``scale`` metres of the plan.
     """
     apart = apart or scale * footprint_spacing_m(vehicle)
-    gears, ends = gears_of(plan, vehicle), [0, *cusps_of(plan, vehicle).tolist(), len(plan.states) - 1]
     arrows: list[Floats] = [np.empty((0, 5))]
-    for first, last in pairwise(ends):
+    for first, last, gear in runs_of(plan, vehicle):
         way = plan.states[first : last + 1, :2]
         steps = np.diff(way, axis=0)
         lengths = np.hypot(*steps.T)
@@ -138,7 +136,7 @@ def travel_arrows(
         count = 1 + int(driven[-1] / apart)
         rows = np.searchsorted(driven, driven[-1] * (np.arange(count) + 0.5) / count)
         ahead = steps[rows] / lengths[rows, np.newaxis]
-        arrows.append(np.hstack([way[rows + 1], ahead, gears[first + rows, np.newaxis]]))
+        arrows.append(np.hstack([way[rows + 1], ahead, np.full((count, 1), gear)]))
     return np.concatenate(arrows)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Final
+from typing import Any
 
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.plain import plain
@@ -28,8 +28,6 @@ from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.settings.checks import check_times, is_whole
 from tasks.settings.errors import UsageError
-
-_TIMES: Final = ("time_limit", "improve_seconds")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,6 @@ class Memory:
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        check_times(time_limit, improve_seconds, _TIMES)
         return self._planned(self._read(problem), began, time_limit, improve_seconds)
 
     def plan_arrays(
@@ -138,7 +135,6 @@ class Memory:
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        check_times(time_limit, improve_seconds, _TIMES)
         problem = problem_of_arrays(
             *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
             vehicle=self.vehicle,
@@ -206,8 +202,9 @@ class Memory:
     def _planned(
         self, problem: Problem, began: float, time_limit: float | None, improve_seconds: float
     ) -> Answer:
+        check_times(time_limit, improve_seconds, ("time_limit", "improve_seconds"))
         canonical, alignment = to_canonical(problem)
-        limits = None if time_limit is None else replace(usual_limits(canonical), seconds=time_limit)
+        limits = usual_limits(canonical, time_limit)
         with self._workspace() as workspace:
             attempt = solve(
                 *(canonical, self.planner, self.assist, self.top_k, self.stored, self.seed, limits),

@@ -14,7 +14,7 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
-from planners.memory_answers import answers_in_parts, least_blocked
+from planners.memory_answers import answers_in_parts, blind_choices, least_blocked
 from planners.search.free_goal import aimed_view
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
@@ -22,7 +22,6 @@ from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import blocked_states
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, is_canonical
-from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
 from planners.world.workspace import Workspace
@@ -135,5 +134,5 @@ def parts_found(
             return None
         memory = memory.library
     is_blind = attempt.assist.startswith("random-")
-    blindly = generator(attempt.seed, "random-plans", problem.id) if is_blind else None
+    blindly = blind_choices(attempt.seed, problem) if is_blind else None
     return sub_plan_answer(memory, aimed_view(problem, vehicle), vehicle, blindly)

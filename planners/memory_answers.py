@@ -75,10 +75,14 @@ def answer_from(
     use = assist.removeprefix("random-")
     usual = SUB_PLANS if isinstance(memory, PlanLibrary) else strategy or default_recall(memory)
     strategy = usual if use == assist else "random"
-    blindly = _blindly(seed, problem) if strategy == "random" else None
+    is_blind = strategy == "random"
+
+    def blindly() -> np.random.Generator | None:  # for each that picks, so that none depends on the others
+        return blind_choices(seed, problem) if is_blind else None
+
     whole = MemoryAnswer()
     if isinstance(memory, Memory) and is_canonical(problem):
-        recalled = recall(memory, view, strategy, top_k, blindly)
+        recalled = recall(memory, view, strategy, top_k, blindly())
         whole = MemoryAnswer(strategy, recalled=recalled.plans, checks=recalled.checks)
         if recalled.free >= 0:
             plan = turned(memory.plans[recalled.free], problem.start[2])
@@ -89,23 +93,22 @@ def answer_from(
     library = memory if isinstance(memory, PlanLibrary) else memory.library
     drive = DriveAnswer()
     if polished and use in JOINS and suits(goal_of(problem, vehicle), vehicle):
-        drive = drive_answer(library, view, vehicle, until, blindly)
+        drive = drive_answer(library, view, vehicle, until, blindly())
         if drive.plan is not None:
             return MemoryAnswer(
-                *(DRIVES if blindly is None else strategy, drive.plan, "repaired", drive.is_long),
+                *(strategy if is_blind else DRIVES, drive.plan, "repaired", drive.is_long),
                 recalled=(drive.number,),
                 checks=drive.checks,
                 is_polished=True,
             )
-    blindly = blindly and _blindly(seed, problem)  # as if no whole plan had been picked
-    parts = sub_plan_answer(library, view, vehicle, blindly)
+    parts = sub_plan_answer(library, view, vehicle, blindly())
     stays_whole = parts.plan is None and bool(whole.recalled)
     answer = MemoryAnswer(
-        strategy if stays_whole or blindly is not None else SUB_PLANS,
+        strategy if stays_whole or is_blind else SUB_PLANS,
         parts.plan,
         recalled=whole.recalled if stays_whole else (),
         checks=whole.checks + drive.checks + parts.checks,
-        endings=library.endings if use in JOINS and blindly is None else None,
+        endings=library.endings if use in JOINS and not is_blind else None,
         knows_way=parts.knows_way,
     )
     if parts.plan is None:
@@ -123,7 +126,8 @@ def answers_in_parts(memory: Memory, problem: Problem) -> bool:
     return memory.heading is not None and not memory.begins_with(problem.start[2])
 
 
-def _blindly(seed: int, problem: Problem) -> np.random.Generator:
+def blind_choices(seed: int, problem: Problem) -> np.random.Generator:
+    """What picks plans blindly for a problem: the same choices for the same seed."""
     return generator(seed, "random-plans", problem.id)
 
 

@@ -78,7 +78,7 @@ def _stored(
     k: int,
     workspace: Workspace | None,
 ) -> list[RankedPlan]:
-    view = View(canonical, workspace or Workspace())
+    view = View(canonical, workspace)
     best = recall(memory, view, default_recall(memory), 1).free
     scores = memory.scores(memory.forward(view.bits), view.bits, view.workspace)
     ranked = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,7 +17,7 @@ from dashboards.figures.marks import draw_travel_arrows
 from dashboards.palette import GREEN, INK, PURPLE, SKY
 from dashboards.world_outlines import outlines
 from planners.world.arrays import Floats
-from planners.world.driving_cost import cusps_of, gears_of
+from planners.world.driving_cost import runs_of
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
@@ -35,21 +34,21 @@ def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     swept = PathPatch(_path_of(swept_by(plan.states, vehicle)), facecolor=_SWEPT, linewidth=0, zorder=2)
     axes.add_patch(swept)
     draw_way(axes, plan, vehicle, 6.5)
-    gears = gears_of(plan, vehicle)
-    for row in [*cusps_of(plan, vehicle), *[len(gears)] * (len(gears) > 0)]:
-        colour = FORWARDS if gears[row - 1] > 0 else BACKWARDS
-        bodies, _ = outlines(plan.states[row : row + 1], vehicle)
+    for _, last, gear in runs_of(plan, vehicle):
+        colour = FORWARDS if gear > 0 else BACKWARDS
+        bodies, _ = outlines(plan.states[last : last + 1], vehicle)
         drawn = PolyCollection(bodies, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=3)
         axes.add_collection(drawn)
 
 
 def draw_way(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, zorder: float = 4.0) -> None:
     """Draw the way of the reference point along ``plan`` in the colours of its gears, with arrows."""
-    gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
-    for first, last in pairwise([0, *cusps, len(gears)] if len(gears) else []):
-        colour = FORWARDS if gears[first] > 0 else BACKWARDS
+    runs = runs_of(plan, vehicle)
+    for first, last, gear in runs:
+        colour = FORWARDS if gear > 0 else BACKWARDS
         axes.plot(*plan.states[first : last + 1, :2].T, color=colour, linewidth=1.8, zorder=zorder)
     draw_travel_arrows(axes, plan, vehicle, {1: FORWARDS, -1: BACKWARDS})
+    cusps = [run.first for run in runs[1:]]
     axes.plot(
         *plan.states[cusps, :2].T, linestyle="none", marker="o", markersize=4, color="white",
         markeredgecolor=INK, markeredgewidth=1.0, zorder=zorder + 0.5,
@@ -82,8 +81,9 @@ def manoeuvre_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Pa
 
 def way_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Patch]:
     """What ``draw_way`` draws of these ``drives``, plans and who drives them."""
-    gears = {gear for plan, vehicle in drives for gear in gears_of(plan, vehicle).tolist()}
-    changes = any(len(cusps_of(plan, vehicle)) for plan, vehicle in drives)
+    each = [runs_of(plan, vehicle) for plan, vehicle in drives]
+    gears = {run.gear for runs in each for run in runs}
+    changes = any(len(runs) > 1 for runs in each)
     shown: list[tuple[bool, Line2D | Patch]] = [
         (1 in gears, Line2D([], [], color=FORWARDS, linewidth=1.8, label="forwards")),
         (-1 in gears, Line2D([], [], color=BACKWARDS, linewidth=1.8, label="backwards")),

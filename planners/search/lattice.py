@@ -68,9 +68,9 @@ class LatticeSettings(NamedTuple):
 
 NOWHERE = place(0.0, 0.0, 0.0)
 TRIALS = 4  # for which expansions are left in any case
-KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for their polish, ...
-KEPT_OF_FEW = 0.75  # ... or this share of few seconds, but then ...
-ENOUGH_S = 1.0  # ... no more than so many
+KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for their polish
+KEPT_IF_SHORT = 0.75  # the same where few seconds are left, ...
+MOST_IF_SHORT_S = 1.0  # ... but then at most so many
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
@@ -191,7 +191,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         if may_squeeze and search.is_stuck:
             may_squeeze = False
             left = query.limits.expansions - int(tree.counts[trees.EXPANSIONS])
-            squeezed, expansions, checks = squeeze(query, search, left // 2, halfway())
+            squeezed, expansions, checks = squeeze(query, search, left // 2, until_polish())
             tree.counts[trees.EXPANSIONS] += expansions
             tree.counts[trees.CHECKS] += checks
         return squeezed is not None
@@ -205,9 +205,9 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             return False
         return manoeuvring.is_enclosed
 
-    def halfway() -> float:
+    def until_polish() -> float:
         left = latest - working_clock()
-        return latest - max(KEPT_BACK * left, min(KEPT_OF_FEW * left, ENOUGH_S))
+        return latest - max(KEPT_BACK * left, min(KEPT_IF_SHORT * left, MOST_IF_SHORT_S))
 
     def beside(work: int) -> Plan | None:
         if squeezed is not None or query.beside is None:
@@ -228,7 +228,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     if query.others and outcome.plan is not None and manoeuvring is not None and squeezed is None:
         began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
-        ends = halfway()
+        ends = until_polish()
         longest = settings.longest, query.limits.further
         left = manoeuvring.further(settings.further, longest, settings.for_one, left, ends)
         kept = manoeuvring.kept

@@ -60,10 +60,16 @@ class Limits:
     further: int = 0  # expansions at least for drives of other kinds after a first to a pose
 
 
-def usual_limits(problem: Problem) -> Limits:
-    """The limits if none are given: a pose is worth more, since with trailers it may take some seconds."""
+def usual_limits(problem: Problem, seconds: float | None = None) -> Limits:
+    """The limits if none are given: a pose is worth more, since with trailers it may take some seconds.
+
+    Args:
+        problem: what is asked.
+        seconds: after which planning has to end; None: as usual.
+    """
     is_pose = problem.arrival is not None and problem.arrival.heading is not None
-    return Limits(expansions=POSE_EXPANSIONS) if is_pose else Limits()
+    expansions = POSE_EXPANSIONS if is_pose else Limits.expansions
+    return Limits(expansions=expansions, seconds=Limits.seconds if seconds is None else seconds)
 
 
 @dataclass(frozen=True, eq=False)

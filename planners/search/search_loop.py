@@ -25,8 +25,8 @@ Grow = Callable[[trees.Tree, Floats, int], None]  # tree, goal, number of expans
 GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
 _FIRST = (Status.BUDGET_SPENT, Status.START_BLOCKED, Status.GOAL_BLOCKED, Status.SOLVED)
 SLICE = 256  # expansions between two looks at the clock: a few milliseconds
-SHORT_SLICE = 16  # the same where no more than ...
-SHORT_S = 1.0  # ... so many seconds are given
+SHORT_SLICE = 16  # the same if a search has at most ``SHORT_S``
+SHORT_S = 1.0  # seconds
 
 
 @lean

@@ -5,7 +5,8 @@ Plans are compared by this. Unless a vehicle's file says otherwise it is the dri
 
 from __future__ import annotations
 
-from typing import Final
+from itertools import pairwise
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -74,6 +75,21 @@ def gears_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
 def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
     """The rows of the states at which ``vehicle`` changes gear on ``plan``."""
     return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
+
+
+class Run(NamedTuple):
+    """A part of a plan in one gear."""
+
+    first: int  # row of its first state
+    last: int  # row of its last state, the first of the next run
+    gear: int  # 1 or -1
+
+
+def runs_of(plan: Plan, vehicle: Vehicle = CAR) -> list[Run]:
+    """The parts of ``plan`` between changes of gear, in order; none of a plan that is one state."""
+    gears = gears_of(plan, vehicle).tolist()
+    ends = [0, *cusps_of(plan, vehicle).tolist(), len(gears)] if gears else []
+    return [Run(first, last, gears[first]) for first, last in pairwise(ends)]
 
 
 def metres_backwards(plan: Plan, vehicle: Vehicle) -> float:

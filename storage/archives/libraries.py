@@ -26,6 +26,11 @@ HEADERS: Final = tuple(f"{kind}.json" for kind in _KINDS)  # one is in the folde
 _DRIFT: Final = 1e-6  # metres and radians by which states may differ from the simulated controls
 
 
+def holds_plans(folder: Path) -> bool:
+    """Whether a folder is that of a memory or a library."""
+    return any((folder / header).is_file() for header in HEADERS)
+
+
 def save_library(folder: Path, library: PlanLibrary, gathered: Any = None) -> None:
     """Write a ``library`` as a ``folder``, whole or not at all; the same plans give the same bytes.
 

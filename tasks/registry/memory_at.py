@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from storage.archives.libraries import HEADERS
+from storage.archives.libraries import holds_plans
 from tasks.registry.model_uris import memory_folder
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import COMBINED
@@ -30,7 +30,7 @@ def memory_at(address: str) -> Iterator[Path]:
 
 def _archive(folder: Path) -> Path:
     memories = sorted(header.parent for header in folder.glob("memories/[!.]*/memory.json"))
-    if any((folder / header).is_file() for header in HEADERS) or not memories:
+    if holds_plans(folder) or not memories:
         return folder
     chosen = [memory for memory in memories if memory.name == COMBINED] or memories
     if len(chosen) > 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from planners.world.vehicles.vehicle import Vehicle, name_of
-from storage.archives.libraries import HEADERS, vehicle_of
+from storage.archives.libraries import holds_plans, vehicle_of
 from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import vehicle_of_problems
 from storage.vehicles.stated_vehicle import refuse_another_driver, refuse_memory_of_another
@@ -69,6 +69,6 @@ def _vehicle_of_memory(memory: str | None) -> Vehicle | None:
     """The vehicle of the memories at an address; None if there are none."""
     with memory_folder(memory) as folder:
         for place in () if folder is None else (folder, *sorted(folder.glob("memories/[!.]*"))):
-            if any((place / header).is_file() for header in HEADERS):
+            if holds_plans(place):
                 return vehicle_of(place)
     return None

@@ -109,7 +109,7 @@ class Assistant:
         deadline = perf_counter() + WARM_SECONDS
         seed = self.settings.seed
         assists = dict.fromkeys((self.settings.assist, UNASSISTED.name))
-        limits = replace(usual_limits(other), seconds=WARM_WORK_S)
+        limits = usual_limits(other, WARM_WORK_S)
         while True:
             attempts = [self.attempt(other, assist, seed + 1, limits) for assist in assists]
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
@@ -148,8 +148,6 @@ class Assistant:
     ) -> Attempt:
         """Attempt a canonical problem, with other settings if given; the plan is not checked."""
         assist = assist or self.settings.assist
-        if limits is None and self.settings.time_limit is not None:
-            limits = replace(usual_limits(canonical), seconds=self.settings.time_limit)
         return solve(
             canonical,
             self.settings.planner,
@@ -157,7 +155,7 @@ class Assistant:
             self.settings.top_k,
             None if assist in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
             self.settings.seed if seed is None else seed,
-            limits,
+            limits or usual_limits(canonical, self.settings.time_limit),
             vehicle=self.vehicle,
             strategy=self.settings.recall,
             workspace=self._workspace,

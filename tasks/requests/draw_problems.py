@@ -55,7 +55,9 @@ def _picture(problems: list[Problem], vehicle: Vehicle, drawing: Path) -> None:
     from dashboards.figures.style import save_picture
 
     shown = problems[:PICTURED]
-    title = (
-        "Problems" if len(shown) == len(problems) else f"The first {len(shown)} of {len(problems):,} problems"
-    )
-    save_picture(gallery_of_problems(shown, vehicle, title), drawing)
+    save_picture(gallery_of_problems(shown, vehicle, title_of(len(shown), len(problems))), drawing)
+
+
+def title_of(shown: int, count: int) -> str:
+    """The title of a picture that shows the first of some problems."""
+    return "Problems" if shown == count else f"The first {shown} of {count:,} problems"

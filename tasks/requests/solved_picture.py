@@ -11,13 +11,13 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, read_plan
 from storage.exchange.problems import problems_or_faults_of
+from tasks.requests.draw_problems import PICTURED, title_of
 from tasks.requests.plan_answers import gears_told, plan_answer
 from tasks.requests.problem_parts import FilePart, plan_path
 
 if TYPE_CHECKING:
     from dashboards.figures.pictures import Example
 
-PICTURED: Final = 6  # problems at most
 LONGEST_ID: Final = 32  # letters, for which a picture has room
 
 
@@ -34,8 +34,7 @@ def draw_solved(parts: Sequence[FilePart], vehicle: Vehicle, drawing: Path) -> N
 
     examples = [_example(*each, vehicle) for each in islice(_solved(parts, vehicle), PICTURED)]
     count = sum(part.problem_slice.count for part in parts)
-    shown = f"The first {len(examples)} of {count:,} problems" if len(examples) < count else "Problems"
-    title = f"{shown} and their plans" if count > 1 else "A problem and its plan"
+    title = f"{title_of(len(examples), count)} and their plans" if count > 1 else "A problem and its plan"
     save_picture(gallery(examples, title), drawing)
 
 

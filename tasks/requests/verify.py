@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
-from storage.archives.libraries import HEADERS
+from storage.archives.libraries import holds_plans
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, is_remote, local_place
 from storage.worlds.importing import ImportSettings
@@ -51,7 +51,7 @@ def verify(
     if not 0.0 <= sample <= 1.0:
         raise UsageError(f"--sample is {sample}: give a share from 0 to 1.")
     is_data = fetch(local_place(path) / MARK).is_file()
-    is_stored = any((path / header).is_file() for header in HEADERS)
+    is_stored = holds_plans(path)
     for option, given in (("--problems", problems), ("--map", on_map)):
         if given is not None and (is_data or is_stored):
             raise UsageError(f"{option} goes with the files of plans, and {path} is something else.")

@@ -26,7 +26,7 @@ from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.encoders import load_encoder
 from storage.archives.hallucinators import load_hallucinator
-from storage.archives.libraries import HEADERS
+from storage.archives.libraries import holds_plans
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
@@ -77,7 +77,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     checks += [
         partial(_library, path)
         for path in ([] if data.is_remote else folders_in(data.libraries))  # there they are no folders
-        if any((path / header).is_file() for header in HEADERS)
+        if holds_plans(path)
     ]
     if not checks:
         raise RunError(f"{folder} does not hold a run or a library; make one with `motion-memory run`.")

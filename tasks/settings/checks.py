@@ -78,7 +78,7 @@ def check_flag(name: str, value: object) -> None:
 
 
 def check_times(time_limit: float | None, improve_seconds: float, names: tuple[str, str]) -> None:
-    """Refuse a limit of time, or a time for improvement, that is no possible number of seconds.
+    """Refuse a time limit that is not above 0 seconds, or a time for improvement below 0.
 
     Args:
         time_limit: seconds above 0; None is no limit.

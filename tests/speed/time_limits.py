@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -113,11 +112,9 @@ def _attempts(
 
     def attempt(problem: Problem, number: int) -> Attempt:
         seconds, memory = ways[number]
-        limits, assist = usual_limits(problem), "none" if memory is None else "repair"
-        within = limits if seconds is None else replace(limits, seconds=seconds)
         return solve(
-            *(problem, "lattice", assist, 5, memory),
-            limits=within,
+            *(problem, "lattice", "none" if memory is None else "repair", 5, memory),
+            limits=usual_limits(problem, seconds),
             vehicle=vehicle,
             workspace=workspace,
         )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import pairwise
 from time import perf_counter
 from typing import Any, Final
 
@@ -25,7 +23,7 @@ from planners.world.alignment import from_canonical, scaled, shifted, to_canonic
 from planners.world.arrays import Floats
 from planners.world.classes.families import class_or_family, families_of
 from planners.world.classes.problem_classes import CLASSES
-from planners.world.driving_cost import cusps_of, gears_of
+from planners.world.driving_cost import runs_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -128,9 +126,7 @@ def _answer(
     """An attempt as the editor shows it, in the world's own frame, and its plan in that of the problem."""
     own = plan and shifted(scaled(plan, problem.scale), problem.offset)
     way = np.round(own.states[:, :2], 2).tolist() if own else []
-    cusps = [] if plan is None else list(cusps_of(plan, vehicle))
-    gears = [] if plan is None else gears_of(plan, vehicle).tolist()
-    pieces = list(pairwise([0, *cusps, len(gears)])) if gears else []
+    runs = runs_of(plan, vehicle) if plan else []
     return {
         "assist": use,
         "solved": attempt.solved,
@@ -141,8 +137,8 @@ def _answer(
         "length_m": own.length_m if own else None,
         "duration_s": own.duration_s if own else None,
         "way": way,
-        "backwards": [way[first : last + 1] for first, last in pieces if gears[first] < 0],
-        "cusps": [way[row] for row in cusps],
+        "backwards": [way[run.first : run.last + 1] for run in runs if run.gear < 0],
+        "cusps": [way[run.first] for run in runs[1:]],
         "bodies": _corners(shown_states(plan, vehicle), problem, vehicle) if plan else [],
     }
 
@@ -152,7 +148,7 @@ def _median(
 ) -> tuple[Attempt, float]:
     """An attempt, and the median milliseconds of a few: the first one may find everything cold."""
     key = (planner, assist, vehicle, canonical.arrival is None, isinstance(memory, PlanLibrary))
-    limits, workspace = replace(usual_limits(canonical), seconds=MOST_SECONDS), Workspace()
+    limits, workspace = usual_limits(canonical, MOST_SECONDS), Workspace()
     times: list[float] = []
     began = perf_counter()
     while True:

@@ -152,31 +152,37 @@ def _found(
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used = 0
     number, best, below = -1, None, cheaper_than
+
+    def cost_s(k: int, guess: Plan) -> float:
+        return guess.duration_s + extras[k] * vehicle.dt
+
     for attempt in effort.attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
         began, quickened = working_clock(), {}
-        for k in sorted(guesses, key=lambda k: guesses[k].duration_s + extras[k] * vehicle.dt):
+        for k in sorted(guesses, key=lambda k: cost_s(k, guesses[k])):
             guess = given[k] if attempt.afresh else guesses[k]
             quicker, spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
             used += spent
-            if blocked_states(quicker.states, vehicle, drive.scene).mean() <= effort.most_blocked:
-                quickened[k] = quicker
-                now = working_clock()
-                if drive.until - now < HURRIED * (now - began):
-                    break
-        guesses = quickened
+            if blocked_states(quicker.states, vehicle, drive.scene).mean() > effort.most_blocked:
+                continue
+            quickened[k] = quicker
+            now = working_clock()
+            if drive.until - now < HURRIED * (now - began):
+                break
         left = {}
-        costs = {k: guess.duration_s + extras[k] * vehicle.dt for k, guess in guesses.items()}
-        for k in sorted(guesses, key=lambda k: costs[k]):
-            found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below - extras[k], most - used)
+        costs = {k: cost_s(k, guess) for k, guess in quickened.items()}
+        for k in sorted(quickened, key=lambda k: costs[k]):
+            found, spent = _in_whole_steps(
+                drive, quickened[k], vehicle, effort, below - extras[k], most - used
+            )
             used += spent
             if found is not None and (cost := cost_in_steps(found, vehicle)) < below:
                 number, best, below = k, found, cost
             else:
-                left[k] = guesses[k]
+                left[k] = quickened[k]
         promising = PROMISING * cheaper_than * vehicle.dt
         most_s = promising if best is None else (below - 1) * vehicle.dt
         guesses = {k: guess for k, guess in left.items() if costs[k] < most_s}

@@ -16,16 +16,12 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
-from dashboards.figures import pictures
-from dashboards.figures.pictures import Example
 from planners.attempt import Attempt
-from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
 from storage.errors import StorageError
-from storage.exchange.problems import fields_of, read_problems, write_problems
+from storage.exchange.problems import fields_of, write_problems
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked
 from storage.tables.attempts import read_attempts, write_attempts
@@ -34,7 +30,6 @@ from tasks.requests import problem_parts as parts
 from tasks.requests import solve_many as many_module
 from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.solve_many import solve_many
-from tasks.settings.errors import UsageError
 from tests.flows.same_rows import equal_but_for_seconds
 
 ROOT = Path(__file__).parents[3]
@@ -148,36 +143,6 @@ class Counting:
             raise StoppedError
         self.written += 1
         write_attempts(path, rows, key)
-
-
-def test_the_first_problems_and_their_plans_are_drawn(
-    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    drawn: list[Sequence[Example]] = []
-    real = pictures.gallery
-
-    def gallery(examples: Sequence[Example], title: str) -> Figure:
-        drawn.append(examples)
-        return real(examples, title)
-
-    monkeypatch.setattr(pictures, "gallery", gallery)
-    rows, plans, drawing = tmp_path / "rows.parquet", tmp_path / "plans", tmp_path / "plans.png"
-    for _ in range(2):  # of finished rows, too
-        solve_many(ASSISTANT, problems, rows, plans, drawing=drawing)
-        assert drawing.stat().st_size > 10_000
-        drawing.unlink()
-    asked = read_problems(problems)
-    for examples in drawn:
-        assert [example.problem.id for example in examples] == [each.id for each in asked[: len(examples)]]
-        assert SIZE < len(examples) < COUNT
-        for example in examples:
-            assert example.answer is not None
-            assert not faults(example.problem, example.answer)
-    with pytest.raises(UsageError, match="--plans"):
-        solve_many(ASSISTANT, problems, rows, drawing=drawing)
-    for file in (problems, tmp_path / "new.parquet"):
-        with pytest.raises(UsageError, match="is a file"):
-            solve_many(ASSISTANT, problems, tmp_path / "new.parquet", file)
 
 
 def test_rows_come_in_the_order_of_the_problems(undisturbed: pd.DataFrame, problems: Path) -> None:
