@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import fcl
 import numpy as np
@@ -17,6 +18,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 _HEIGHT = 1.0  # FCL's world has three dimensions: everything here is a prism that high
 _RUN = 32  # steps whose common box is tried at once
+_STRETCH = 256  # steps that are compared at once with all pieces around them
 # Verified against dense samples of the motion: of FCL's solvers and motions only these jump nothing. The
 # default solver samples, and the linear motion misses what a turning corner hits. A screw is an arc here.
 # They sometimes meet a long thin triangle that is decimetres away, so what they meet is looked at again.
@@ -30,6 +32,14 @@ _MOTION = fcl.ContinuousCollisionRequest(
 _TOUCHING = fcl.CollisionRequest(gjk_solver_type=fcl.GJKSolverType.GST_INDEP)
 _APART = fcl.DistanceRequest(gjk_solver_type=fcl.GJKSolverType.GST_INDEP)
 _TOUCH = 1e-4  # metres: bodies so near meet
+
+
+class _Boxes(NamedTuple):
+    """Boxes along the axes, as many as there are rows."""
+
+    low: Floats  # [N, 2] metres: left and bottom
+    high: Floats  # [N, 2] metres: right and top
+
 
 Finer = Callable[[int], Body]  # a body within one step, in the short steps that it consists of
 
@@ -53,16 +63,19 @@ def sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: Ve
 def _body_faults(problem: Problem, body: Body, finer: Finer) -> list[str]:
     """The first step in which a body leaves the bounds, or else the first in which it meets an obstacle.
 
-    A box around the footprints of a run of steps is tried first, and halved while it meets something; a
-    single step is then judged by continuous collision.
+    Steps whose upright boxes meet that of no piece are free. Of the others a box around the footprints of a
+    run of steps is tried first, and halved while it meets something; a single step is then judged by
+    continuous collision.
     """
     steps = len(body.bend)
-    for step in np.flatnonzero(_leaves(problem, body)).tolist():
-        if steps == 0 or _leaves(problem, finer(step)).any():
-            return [f"Bounds: the {body.name}'s footprint leaves them near state {step}."]
-    manager = _manager(problem)
     corners = _corners_of(body)
-    runs = [(i, min(i + _RUN, steps)) for i in range(0, max(steps, 1), _RUN)][::-1]
+    boxes = _boxes_of(body, corners)
+    for step in np.flatnonzero(_leaves(problem, boxes)).tolist():
+        if steps == 0 or _leaves(problem, _boxes_of(finer(step))).any():
+            return [f"Bounds: the {body.name}'s footprint leaves them near state {step}."]
+    manager, pieces = _obstacles(problem)
+    near = np.flatnonzero(np.diff(_are_near(boxes, pieces), prepend=False, append=False)).reshape(-1, 2)
+    runs = [(i, min(i + _RUN, end)) for begin, end in near.tolist() for i in range(begin, end, _RUN)][::-1]
     while runs:
         first, last = runs.pop()
         if last - first > 1:
@@ -86,17 +99,35 @@ def _corners_of(body: Body, states: slice = slice(None)) -> Floats:
     return np.stack([centres + u * along + w * across for u, w in body.corners], axis=1)
 
 
-def _leaves(problem: Problem, body: Body) -> npt.NDArray[np.bool_]:
-    """In which steps ``[T - 1]`` a body may leave the bounds; of one that stands, whether it does."""
-    corners = _corners_of(body)
+def _boxes_of(body: Body, corners: Floats | None = None) -> _Boxes:
+    """Boxes around what a body with ``corners [T, n, 2]`` sweeps in each step; one where it stands."""
+    corners = _corners_of(body) if corners is None else corners
     low: Floats = corners.min(axis=1)
     high: Floats = corners.max(axis=1)
-    bend: Floats = np.zeros(1)
-    if len(body.bend):
-        low, high = np.minimum(low[:-1], low[1:]), np.maximum(high[:-1], high[1:])
-        bend = body.bend
-    outside = np.maximum(problem.bounds[:2] - low, high - problem.bounds[2:]).max(axis=1) > -bend
+    if len(body.bend) == 0:
+        return _Boxes(low, high)
+    bend = body.bend[:, None]
+    return _Boxes(np.minimum(low[:-1], low[1:]) - bend, np.maximum(high[:-1], high[1:]) + bend)
+
+
+def _leaves(problem: Problem, boxes: _Boxes) -> npt.NDArray[np.bool_]:
+    """In which steps ``[T - 1]`` a body may leave the bounds; of one that stands, whether it does."""
+    outside = np.maximum(problem.bounds[:2] - boxes.low, boxes.high - problem.bounds[2:]).max(axis=1) > 0.0
     return np.asarray(outside)
+
+
+def _are_near(boxes: _Boxes, pieces: _Boxes) -> npt.NDArray[np.bool_]:
+    """Which of the ``boxes [N]``, taken a little wider, meet one of the ``pieces [P]``."""
+    near = np.zeros(len(boxes.low), bool)
+    for begin in range(0, len(near), _STRETCH):
+        stretch = slice(begin, begin + _STRETCH)
+        low, high = boxes.low[stretch] - _TOUCH, boxes.high[stretch] + _TOUCH
+        around = ((pieces.low <= high.max(axis=0)) & (pieces.high >= low.min(axis=0))).all(axis=1)
+        (left, bottom), (right, top) = pieces.low[around].T, pieces.high[around].T
+        meet = (left <= high[:, :1]) & (right >= low[:, :1])
+        meet &= (bottom <= high[:, 1:]) & (top >= low[:, 1:])
+        near[stretch] = meet.any(axis=1)
+    return near
 
 
 def _any_step_meets(manager: fcl.DynamicAABBTreeCollisionManager, body: Body) -> bool:
@@ -153,12 +184,17 @@ def _convex(polygon: Floats) -> fcl.Convex:
 
 
 @functools.lru_cache(maxsize=1)  # many plans are judged in one problem
-def _manager(problem: Problem) -> fcl.DynamicAABBTreeCollisionManager:
-    """FCL's tree of all pieces."""
+def _obstacles(problem: Problem) -> tuple[fcl.DynamicAABBTreeCollisionManager, _Boxes]:
+    """FCL's tree of all pieces, and the boxes around them."""
+    pieces = problem.obstacles.pieces()
     manager = fcl.DynamicAABBTreeCollisionManager()
-    manager.registerObjects([prism(piece) for piece in problem.obstacles.pieces()])
+    manager.registerObjects([prism(piece) for piece in pieces])
     manager.setup()
-    return manager
+    if not pieces:
+        return manager, _Boxes(np.empty((0, 2)), np.empty((0, 2)))
+    corners = np.concatenate(pieces)
+    first = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
+    return manager, _Boxes(np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first))
 
 
 def _pose(centre: Floats, along: Floats) -> fcl.Transform:
