@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
-from motion_memory.files import read_problems, read_worlds, solve_many
+from motion_memory.files import read_map, read_problems, read_worlds, solve_many
 from motion_memory.loading import load
 from motion_memory.memory import Answer, Memory
+from planners.maps.occupancy_map import OccupancyMap
 from planners.ranked_plans import RankedPlan
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
@@ -25,6 +26,7 @@ __all__ = [
     "Answer",
     "Arrival",
     "Memory",
+    "OccupancyMap",
     "Plan",
     "PlanFaultError",
     "Problem",
@@ -34,6 +36,7 @@ __all__ = [
     "UsageError",
     "Vehicle",
     "load",
+    "read_map",
     "read_problems",
     "read_worlds",
     "solve_many",

@@ -46,8 +46,8 @@ def problem_of_arrays(
         ValueError: an array has another shape, the goal is a pose and there is an arrival too, or the problem
             is impossible.
     """
-    x, y, heading = _numbers("start", start, "x, y, heading")
-    x_min, y_min, x_max, y_max = _numbers("bounds", bounds, "x_min, y_min, x_max, y_max")
+    x, y, heading = numbers_given("start", start, "x, y, heading")
+    x_min, y_min, x_max, y_max = numbers_given("bounds", bounds, "x_min, y_min, x_max, y_max")
     asked = _goal(goal, goal_radius, arrival)
     corners = _points(points)
     return checked_problem(
@@ -56,12 +56,12 @@ def problem_of_arrays(
         *(corners, _starts(polygon_starts, len(corners))),
         vehicle=vehicle,
         scale=scale_for_vehicle(scale, vehicle),
-        start_motion=_motion(start_motion),
+        start_motion=motion_given("start_motion", start_motion),
         arrival=asked.arrival,
     )
 
 
-def _numbers(name: str, given: Sequence[float], *meanings: str) -> list[float]:
+def numbers_given(name: str, given: Sequence[float], *meanings: str) -> list[float]:
     """The numbers that a caller gave, as many as one of the ``meanings`` lists, such as "x, y".
 
     Raises ValueError if there are more or fewer, or something else is given.
@@ -72,15 +72,14 @@ def _numbers(name: str, given: Sequence[float], *meanings: str) -> list[float]:
     raise ValueError(f"{name} is {short(given)}; expected {' or '.join(meanings)}")
 
 
-def _motion(given: Sequence[float]) -> tuple[float, ...]:
-    """The motion at the start. Raises ValueError if it is no list of numbers."""
+def motion_given(
+    name: str, given: Sequence[float], meaning: str = "speed, steering or turn rate, hitch angles"
+) -> tuple[float, ...]:
+    """As many numbers of motion as a caller gave. Raises ValueError if it is no list of numbers."""
     try:
         return tuple(float(number) for number in given)
     except (TypeError, ValueError):
-        raise ValueError(
-            f"start_motion is {short(given)}; expected a list of numbers: speed, steering or turn rate, "
-            "hitch angles"
-        ) from None
+        raise ValueError(f"{name} is {short(given)}; expected a list of numbers: {meaning}") from None
 
 
 def _goal(given: Point | Pose, radius: float | None, arrival: Arrival | None) -> Goal:
@@ -88,7 +87,7 @@ def _goal(given: Point | Pose, radius: float | None, arrival: Arrival | None) ->
 
     Raises ValueError if there are fewer or more, or three and an ``arrival``.
     """
-    numbers = _numbers("goal", given, "x, y", "x, y, heading")
+    numbers = numbers_given("goal", given, "x, y", "x, y, heading")
     usual = goal_of({"goal": numbers})
     if len(numbers) == 3 and arrival is not None:
         raise ValueError(

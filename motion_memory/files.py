@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from planners.maps.occupancy_map import OccupancyMap
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.exchange import problems as problem_files
 from storage.fields import number_of
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
-from tasks.settings.checks import check_path, check_seed, check_whole, checked_vehicle
+from tasks.settings.checks import check_known, check_path, check_seed, check_whole, checked_vehicle
 
 
 def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Problem]:
@@ -33,6 +34,33 @@ def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Probl
     else:
         driver = said_vehicle(checked_vehicle(vehicle))
     return problem_files.read_problems(file, driver)
+
+
+def read_map(
+    path: str | Path, *, resolution: float | None = None, unknown: Literal["free", "occupied"] = "occupied"
+) -> OccupancyMap:
+    """Read a map (docs/worlds.md).
+
+    Args:
+        path: a .map, .yaml (ROS), .npy or .npz file.
+        resolution: metres per cell, for a map that does not state it.
+        unknown: what cells are of which the map knows nothing.
+
+    Raises:
+        UsageError: The path is none, or ``unknown`` is something else.
+        ValueError: The resolution is no number.
+        StorageError: The file is missing or no map, or the resolution is out of its range.
+    """
+    from storage.worlds.importing import ImportSettings, load_map  # late, as below
+    from storage.worlds.sources import source_at
+
+    check_path("path", path)
+    check_known("unknown", [unknown], ("free", "occupied"))
+    source = source_at(Path(path))
+    if not source.is_map:
+        raise StorageError(f"{path} is no map: give a .map, .yaml (ROS), .npy or .npz file.")
+    cells_m = None if resolution is None else number_of(resolution, "resolution")
+    return load_map(source, ImportSettings(resolution=cells_m, unknown=unknown))
 
 
 def read_worlds(

@@ -6,15 +6,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.plain import plain
+from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
 from planners.ranked_plans import RankedPlan, ranked_plans
-from planners.search.query import usual_limits
+from planners.search.query import Limits, usual_limits
 from planners.solve import improved, solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
@@ -27,7 +28,11 @@ from storage.exchange.problems import problem_of
 from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.settings.checks import check_times, is_whole
-from tasks.settings.errors import UsageError
+from tasks.settings.errors import RunError, UsageError
+
+if TYPE_CHECKING:
+    from motion_memory.map_router import MapRouter
+    from planners.maps.occupancy_map import OccupancyMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +146,42 @@ class Memory:
         )
         return self._planned(problem, began, time_limit, improve_seconds)
 
+    def router(
+        self, world: OccupancyMap, *, scale: float | None = None, tolerance_m: float = 0.0
+    ) -> MapRouter:
+        """Prepare a map for drives across it, made of local plans (docs/worlds.md#routes).
+
+        Without a memory local plans are searched along fresh guides, as by the
+        command ``route``, unless ``load`` was given another assist.
+
+        Args:
+            world: the map: an ``OccupancyMap`` of a robot's own cells, or what ``read_map`` returns.
+            scale: metres of the map in one metre of the memory's problems; None: the scale of its vehicle.
+            tolerance_m: metres by which outlines of occupied regions may move, which makes them simpler.
+
+        Raises:
+            ValueError: the map is none, or too wide, or the vehicle cannot drive backwards.
+            RunError: SciPy is not installed.
+        """
+        try:
+            from motion_memory.map_router import MapRouter  # late: not every robot has SciPy
+        except ModuleNotFoundError as error:
+            raise RunError(f"Routes need {error.name}: pip install 'motion-memory[optimise]'.") from None
+        assist = "fresh" if (self.stored, self.assist) == (None, "none") else self.assist
+        workspace = Workspace()
+
+        def solve_local(problem: Problem, limits: Limits) -> Attempt:
+            return self._attempt(problem, limits, workspace, assist)
+
+        return MapRouter(
+            *(world, solve_local, self.vehicle),
+            scale=scale,
+            tolerance_m=tolerance_m,
+            judged=self.judged,
+            polished=self.polished,
+            seed=self.seed,
+        )
+
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
         """Look up what is stored for a problem, without any search.
 
@@ -206,13 +247,7 @@ class Memory:
         canonical, alignment = to_canonical(problem)
         limits = usual_limits(canonical, time_limit)
         with self._workspace() as workspace:
-            attempt = solve(
-                *(canonical, self.planner, self.assist, self.top_k, self.stored, self.seed, limits),
-                vehicle=self.vehicle,
-                strategy=self.strategy,
-                workspace=workspace,
-                polished=self.polished,
-            )
+            attempt = self._attempt(canonical, limits, workspace, self.assist)
             if improve_seconds > 0.0:
                 attempt = improved(attempt, canonical, improve_seconds, self.vehicle, workspace)
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
@@ -221,6 +256,15 @@ class Memory:
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
         return Answer(problem.id, attempt.status, attempt.source, plan, *spent)
+
+    def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:
+        return solve(
+            *(canonical, self.planner, assist, self.top_k, self.stored, self.seed, limits),
+            vehicle=self.vehicle,
+            strategy=self.strategy,
+            workspace=workspace,
+            polished=self.polished,
+        )
 
     @contextmanager
     def _workspace(self) -> Iterator[Workspace]:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 from planners.routes.legs import Leg, joined
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
+
+SOURCES: Final = ("recalled", "repaired", "searched")  # of legs
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,11 @@ class Route:
     def legs(self) -> list[Leg]:
         """All legs, in the order of the drive."""
         return [leg for section in self.sections for leg in section]
+
+    @property
+    def source(self) -> str:
+        """Where it comes from: "searched" if any leg was, else "repaired" if any was, else "recalled"."""
+        return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
 
     def least_seconds(self, vehicle: Vehicle) -> float:
         """Return how long as many metres take at full speed, from the start's to rest at each stop."""

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from dashboards.cells import CellTable
 from planners.attempt import Attempt
@@ -17,25 +17,21 @@ from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.search.query import Limits
-from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Pose
-from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import name_of
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
-from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
+from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
+from tasks.requests.map_routes import canonical_map, check_drives_backwards, check_route, in_frame_of
 from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
-from tasks.requests.route_summary import SOURCES, legs_from_memory, route_summary, route_table
+from tasks.requests.route_summary import legs_from_memory, route_summary, route_table
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
-
-WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
 
 
 @dataclass
@@ -91,22 +87,14 @@ def drive_route(
     check_plan_file(out)
     check_picture(drawing)
     pose = start_of(request)
-    if assistant.vehicle.min_speed >= 0.0:
-        raise UsageError(
-            f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
-        )
+    check_drives_backwards(assistant.vehicle)
     source = map_source(path, map_format, "a route")
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = told_map(source, settings)
     scale = settings.scale
     stops = stops_of(request, world, assistant.vehicle, scale)
     motion = motion_of(request, assistant.vehicle, scale)
-    canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
-    if max(canonical.size) > WIDEST_M:
-        raise UsageError(
-            f"{path} is {max(world.size):,.0f} m wide; at scale {scale:g} a route can cross at most "
-            f"{scale * WIDEST_M:,.0f} m; cut the map, or correct --scale or --resolution."
-        )
+    canonical = canonical_map(world, scale, str(path))
     solver = _Solver(assistant, scale)
 
     def router_over(each: OccupancyMap) -> Router:
@@ -132,7 +120,7 @@ def drive_route(
         failure = _refusal(route, source, world, scale, any(motion))
         return DrivenRoute(None, [], {"status": "stuck"} | route.fields(world, scale), failure)
     plan = route.plan(assistant.vehicle)
-    _check(route, plan, assistant)
+    check_route(route, plan, assistant.vehicle, assistant.settings.seed)
     record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
@@ -194,31 +182,18 @@ def _refusal(
     return RunError(f"{line} ({tried}); {advice}.")
 
 
-def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
-    """Raise PlanFaultError if the independent judge refuses the route, as one plan or to one of its stops."""
-    parts = list(zip(route.problems, route.plans(assistant.vehicle), strict=True))
-    several = parts if len(parts) > 1 else []
-    for problem, part in [(route.problem, plan), *several]:
-        found = faults(problem, part, assistant.vehicle)
-        if found:
-            raise PlanFaultError(f"The route across {problem.id}, seed {assistant.settings.seed}: {found[0]}")
-
-
 def _record(
     route: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, seconds: float, scale: float
 ) -> PlanRecord:
-    """The plan in the map's frame; the source is "searched" if any leg's is, else "repaired" if any is."""
-    left, bottom, turn = world.origin
-    in_map_frame = from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
-    sources = [leg.source for leg in route.legs]
+    """The plan in the map's frame."""
     return PlanRecord(
         f"{world.name}-route",
         "solved",
-        max(sources, key=SOURCES.index, default="searched"),
+        route.source,
         assistant.settings.planner,
         assistant.settings.assist,
         seconds,
-        in_map_frame,
+        in_frame_of(world, plan, scale),
         assistant.vehicle,
         scale,
     )

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from planners.maps.occupancy_map import OccupancyMap
-from planners.routes.path_ahead import AT_REST, Stop
+from planners.routes.path_ahead import Stop
 from planners.world.arrays import Pose
-from planners.world.checked_problem import NO_OBSTACLES
-from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Problem
-from planners.world.problem_faults import arrival_fault, motion_fault
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE
+from planners.world.problem_faults import arrival_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of, trailers_of
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, Source, source_at
+from tasks.requests.map_routes import at_rest, checked_motion, stop_at
 from tasks.settings.checks import check_known
 from tasks.settings.errors import UsageError
 
@@ -72,9 +72,7 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
             f"--goal-hitch is given {len(hitches)} times, but {name_of(vehicle)} has {trailers} trailers; "
             "give it once for each, or leave it out."
         )
-    posed = AT_REST._replace(
-        heading_tolerance=turn, hitches=hitches, hitch_tolerances=tuple(turn for _ in hitches)
-    )
+    posed = at_rest(turn, hitches)
     fault = arrival_fault(posed, scale, vehicle)
     if fault is not None:
         raise UsageError(f"--goal-hitch: {fault}.")
@@ -84,13 +82,9 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
     stops = []
     for goal in request.goals:
         x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
-        right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
-        place = right / scale, up / scale
         if heading:
             _warn(degrees_hint("The heading of --to", heading[0]))
-            stops.append(Stop(place, radius / scale, posed._replace(heading=facing)))
-        else:
-            stops.append(Stop(place, near / scale))
+        stops.append(stop_at(world, (x, y, *heading), near, radius, posed, scale))
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
     for option, given in (("tolerance", request.goal_tolerance is not None), ("hitch", bool(hitches))):
@@ -108,13 +102,7 @@ def motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[fl
     except ValueError as error:
         begins = "The start " if str(error).startswith("has ") else ""
         raise UsageError(f"{begins}{error}.") from None
-    motion = (given[0] / scale, *given[1:]) if given else ()
-    unbounded = (-math.inf, -math.inf, math.inf, math.inf)
-    start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, motion)
-    fault = motion_fault(start, vehicle)
-    if fault is not None:
-        raise UsageError(f"The {fault}.")
-    return motion
+    return checked_motion(given, vehicle, scale)
 
 
 def _warn(hint: str | None) -> None:

@@ -11,14 +11,13 @@ from planners.attempt import WITHOUT_MEMORY
 from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
-from planners.routes.route import Route
+from planners.routes.route import SOURCES, Route
 from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import LEAST_BACKWARDS_M
 
-SOURCES: Final = ("recalled", "repaired", "searched")
 HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
 FIELDS: Final = (
     *("leg", "source", "driven_m", "braking_m"),

@@ -1,0 +1,189 @@
+"""Drives across a map, in a robot's own process; a map is prepared once, for as many as are asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from motion_memory.array_problems import motion_given, numbers_given
+from planners.attempt import Attempt
+from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.router import Router
+from planners.routes.stuck import Stuck
+from planners.search.query import Limits
+from planners.world.alignment import scaled
+from planners.world.arrays import Point, Pose
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Plan, Problem
+from planners.world.problem_faults import arrival_fault
+from planners.world.vehicles.vehicle import Vehicle
+from storage.fields import short
+from storage.vehicles.vehicle_files import scale_for_vehicle
+from tasks.attempts.judged_attempts import check_attempt
+from tasks.requests.map_routes import (
+    at_rest,
+    canonical_map,
+    check_drives_backwards,
+    check_route,
+    checked_motion,
+    in_frame_of,
+    stop_at,
+)
+from tasks.settings.checks import is_number
+from tasks.settings.errors import UsageError
+
+Solve = Callable[[Problem, Limits], Attempt]
+
+
+@dataclass(frozen=True, eq=False)
+class RouteAnswer:
+    """The result of looking for a drive across a map."""
+
+    status: str  # "solved" or "stuck"
+    source: str | None  # "searched" if any local plan was, else "repaired" or "recalled"; None when stuck
+    plan: Plan | None  # in the map's frame and metres; None when stuck
+    why: str | None  # one clause: why and where it is stuck; None when solved
+    local_plans: int  # how many were looked for
+    planning_seconds: float  # of the whole search, in which the judge looks at each local plan
+
+
+class MapRouter:
+    """Finds drives across one map. One thread may use it at a time."""
+
+    def __init__(
+        self,
+        world: OccupancyMap,
+        solve: Solve,
+        vehicle: Vehicle,
+        *,
+        scale: float | None = None,
+        tolerance_m: float = 0.0,
+        judged: bool = True,
+        polished: bool = True,
+        seed: int = 1,
+    ) -> None:
+        """Prepare a map, as ``Memory.router`` says.
+
+        Args:
+            world: the map.
+            solve: attempts local problems in canonical metres.
+            vehicle: the vehicle that drives.
+            scale: metres of the map in a canonical one; None: the vehicle's.
+            tolerance_m: metres by which outlines of occupied regions may move.
+            judged: whether the judge looks at each plan.
+            polished: whether drives are polished.
+            seed: for the error that the judge raises.
+        """
+        _check_map(world)
+        check_drives_backwards(vehicle)
+        if not (is_number(tolerance_m) and tolerance_m >= 0.0):
+            raise UsageError(f"tolerance_m is {short(tolerance_m)}; give metres, 0 or more.")
+        self._world, self._solve, self._vehicle, self._judged, self._seed = (
+            world,
+            solve,
+            vehicle,
+            judged,
+            seed,
+        )
+        self._scale = scale_for_vehicle(scale, vehicle)
+        canonical = canonical_map(world, self._scale, "The map")
+        self._local_plans = 0
+        self._router = Router(canonical, self._local, vehicle, tolerance_m / self._scale, polished)
+
+    def route(
+        self,
+        start: Pose,
+        goals: Sequence[Point | Pose],
+        *,
+        start_motion: Sequence[float] = (),
+        goal_radius: float | None = None,
+        goal_tolerance: tuple[float, float] | None = None,
+        goal_hitches: Sequence[float] = (),
+    ) -> RouteAnswer:
+        """Find a drive from a pose through all goals, at each of which it stops; or say where it is stuck.
+
+        Args:
+            start: x, y in metres of the map's frame, heading in radians.
+            goals: in the order of the drive; each x, y: a place; or x, y, heading: a pose.
+            start_motion: the entries of the start state after the pose, as for ``Memory.plan_arrays``.
+            goal_radius: metres by which places may be missed; None: 2, times the scale.
+            goal_tolerance: metres and radians by which poses may be missed; None: 0.1, times the scale, and
+                0.05.
+            goal_hitches: hitch angles in poses, rad, one for each trailer; none: as they come.
+
+        Raises:
+            ValueError: an argument is no such numbers, or the vehicle cannot move or stand so.
+            PlanFaultError: the independent judge refuses a plan.
+        """
+        scale = self._scale
+        x, y, heading = _finite("start", start, "x, y, heading")
+        radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
+        if goal_tolerance is not None:
+            radius, turn = _finite("goal_tolerance", goal_tolerance, "metres, radians")
+        near = scale * GOAL_RADIUS if goal_radius is None else goal_radius
+        for name, value in (("goal_radius", near), ("goal_tolerance", radius), ("goal_tolerance", turn)):
+            if not (is_number(value) and value > 0.0):
+                raise UsageError(f"{name} is {short(value)}; give numbers above 0, or leave it out.")
+        posed = at_rest(turn, motion_given("goal_hitches", goal_hitches, "angles, one for each trailer"))
+        fault = arrival_fault(posed, scale, self._vehicle)
+        if fault is not None:
+            raise UsageError(f"The {fault}.")
+        stops = [stop_at(self._world, goal, near, radius, posed, scale) for goal in _goals(goals)]
+        motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
+        x, y, heading = self._world.grid_pose(x, y, heading)
+        self._local_plans = 0
+        began = perf_counter()
+        route = self._router.route((x / scale, y / scale, heading), stops, motion)
+        seconds = perf_counter() - began
+        if isinstance(route, Stuck):
+            why = route.told(self._world, scale)
+            return RouteAnswer("stuck", None, None, why, self._local_plans, seconds)
+        plan = route.plan(self._vehicle)
+        if self._judged:
+            check_route(route, plan, self._vehicle, self._seed)
+        driven = scaled(in_frame_of(self._world, plan, scale), scale)
+        return RouteAnswer("solved", route.source, driven, None, self._local_plans, seconds)
+
+    def _local(self, problem: Problem, limits: Limits) -> Attempt:
+        """Attempt a local problem, have its plan judged, and count it."""
+        problem = replace(problem, scale=self._scale)
+        attempt = self._solve(problem, limits)
+        self._local_plans += 1
+        return check_attempt(problem, attempt, set(), self._vehicle) if self._judged else attempt
+
+
+def _finite(name: str, given: Sequence[float], *meanings: str) -> list[float]:
+    """As many numbers as one of the ``meanings`` lists; a ValueError if they are others, or not finite."""
+    numbers = numbers_given(name, given, *meanings)
+    if not all(map(math.isfinite, numbers)):
+        raise UsageError(f"{name} is {short(numbers)}; give finite numbers.")
+    return numbers
+
+
+def _check_map(world: OccupancyMap) -> None:
+    """Raise UsageError unless a map is one."""
+    if not isinstance(world, OccupancyMap):
+        raise UsageError(f"The map is {short(world)}; give an OccupancyMap, such as read_map returns.")
+    occupied = world.occupied
+    if (
+        not isinstance(occupied, np.ndarray)
+        or occupied.dtype != np.bool_
+        or occupied.ndim != 2
+        or not occupied.size
+    ):
+        raise UsageError(
+            "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest."
+        )
+    if not (is_number(world.resolution) and world.resolution > 0.0):
+        raise UsageError(f"The map's resolution is {short(world.resolution)}; give metres a cell, above 0.")
+    _finite("origin of the map", world.origin, "x, y, turn")
+
+
+def _goals(given: Sequence[Point | Pose]) -> list[list[float]]:
+    """The goals. Raises ValueError unless they are some, each of two or three numbers."""
+    if not isinstance(given, list | tuple | np.ndarray) or len(given) == 0:
+        raise UsageError(f"goals is {short(given)}; give one or more, each x, y or x, y, heading.")
+    return [_finite("each of goals", goal, "x, y", "x, y, heading") for goal in given]
