@@ -63,7 +63,7 @@ class Preset(NamedTuple):
 PRESETS: Final = {
     "smoke": Preset(6, 20, 20, 20, 2, False, "none"),
     "laptop": Preset(100, 1_000, 200, 1_000, 10, False, "none"),
-    "paper": Preset(100, 1_000, 1_000, 10_000, 10, True, "paper"),
+    "paper": Preset(100, 1_000, 1_000, 10_000, 6, True, "paper"),
     "paper-method": Preset(100, 0, 1_000, 10_000, 60, True, "paper", PUBLISHED),
     "paper-method-laptop": Preset(100, 0, 200, 1_000, 20, False, "none", PUBLISHED),
 }
