@@ -73,10 +73,12 @@ def numbers_given(name: str, given: Sequence[float], *meanings: str) -> list[flo
 
 
 def motion_given(
-    name: str, given: Sequence[float], meaning: str = "speed, steering or turn rate, hitch angles"
+    name: str, given: Sequence[float] | str, meaning: str = "speed, steering or turn rate, hitch angles"
 ) -> tuple[float, ...]:
     """As many numbers of motion as a caller gave. Raises ValueError if it is no list of numbers."""
     try:
+        if isinstance(given, str):
+            raise TypeError
         return tuple(float(number) for number in given)
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {short(given)}; expected a list of numbers: {meaning}") from None

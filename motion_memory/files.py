@@ -13,6 +13,7 @@ from storage.exchange import problems as problem_files
 from storage.fields import number_of
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 from tasks.settings.checks import check_known, check_path, check_seed, check_whole, checked_vehicle
+from tasks.settings.errors import RunError
 
 
 def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Problem]:
@@ -50,8 +51,12 @@ def read_map(
         UsageError: The path is none, or ``unknown`` is something else.
         ValueError: The resolution is no number.
         StorageError: The file is missing or no map, or the resolution is out of its range.
+        RunError: SciPy is not installed.
     """
-    from storage.worlds.importing import ImportSettings, load_map  # late, as below
+    try:
+        from storage.worlds.importing import ImportSettings, load_map  # late, as below
+    except ModuleNotFoundError as error:
+        raise RunError(f"Maps need {error.name}: pip install 'motion-memory[optimise]'.") from None
     from storage.worlds.sources import source_at
 
     check_path("path", path)

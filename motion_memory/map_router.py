@@ -22,6 +22,7 @@ from planners.world.problem_faults import arrival_fault
 from planners.world.vehicles.vehicle import Vehicle
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
+from storage.worlds.limits import LARGEST_CELL_M, SMALLEST_CELL_M
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.requests.map_routes import (
     at_rest,
@@ -177,13 +178,18 @@ def _check_map(world: OccupancyMap) -> None:
         raise UsageError(
             "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest."
         )
-    if not (is_number(world.resolution) and world.resolution > 0.0):
-        raise UsageError(f"The map's resolution is {short(world.resolution)}; give metres a cell, above 0.")
+    if not (is_number(world.resolution) and SMALLEST_CELL_M <= world.resolution <= LARGEST_CELL_M):
+        raise UsageError(
+            f"The map's resolution is {short(world.resolution)}; give metres a cell, {SMALLEST_CELL_M:g} to "
+            f"{LARGEST_CELL_M:g}."
+        )
     _finite("origin of the map", world.origin, "x, y, turn")
 
 
 def _goals(given: Sequence[Point | Pose]) -> list[list[float]]:
     """The goals. Raises ValueError unless they are some, each of two or three numbers."""
     if not isinstance(given, list | tuple | np.ndarray) or len(given) == 0:
-        raise UsageError(f"goals is {short(given)}; give one or more, each x, y or x, y, heading.")
+        raise UsageError(f"goals is {short(given)}; give a list of one or more, each x, y or x, y, heading.")
+    if not any(isinstance(goal, list | tuple | np.ndarray) for goal in given):
+        raise UsageError(f"goals is {short(given)}; give a list of goals, such as [(x, y)].")
     return [_finite("each of goals", goal, "x, y", "x, y, heading") for goal in given]

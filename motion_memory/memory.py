@@ -152,7 +152,7 @@ class Memory:
         """Prepare a map for drives across it, made of local plans (docs/worlds.md#routes).
 
         Without a memory local plans are searched along fresh guides, as by the
-        command ``route``, unless ``load`` was given another assist.
+        command ``route``.
 
         Args:
             world: the map: an ``OccupancyMap`` of a robot's own cells, or what ``read_map`` returns.

@@ -98,7 +98,7 @@ def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> t
     start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, canonical)
     fault = motion_fault(start, vehicle)
     if fault is not None:
-        raise UsageError(f"The {fault}.")
+        raise UsageError(f"The {fault.removeprefix('the ')}.")
     return canonical
 
 

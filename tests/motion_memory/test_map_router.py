@@ -107,6 +107,8 @@ def test_where_it_is_stuck_is_told(world: motion_memory.OccupancyMap, router: An
         ({"goal_hitches": ("a",)}, "goal_hitches"),
         ({"start_motion": (1e3,)}, "speed"),
         ({"start_motion": "fast"}, "start_motion"),
+        ({"start_motion": "12"}, "start_motion"),
+        ({"start_motion": (0.5, 0.0, 0.0)}, "^The start has"),
     ],
 )
 def test_bad_questions_get_one_line(
@@ -125,7 +127,8 @@ def test_bad_questions_get_one_line(
         ({"occupied": np.zeros((0, 3), bool)}, "occupied"),
         ({"occupied": [[True]]}, "occupied"),
         ({"resolution": 0.0}, "resolution"),
-        ({"resolution": 1e6}, "wide"),
+        ({"resolution": 1e-9}, "resolution"),
+        ({"resolution": 1e6}, "resolution"),
         ({"origin": (0.0, 0.0)}, "origin"),
         ({"origin": (0.0, 0.0, math.inf)}, "origin"),
     ],

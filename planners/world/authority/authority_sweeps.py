@@ -266,15 +266,14 @@ def _comes_near(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.Co
     half = 0.5 * turn
     longer = half / math.sin(half) if half else 1.0  # the arc over its chord
     most = longer * math.dist(begin, end) + abs(turn) * reach  # metres that any point goes
-    share, apart = 0.0, math.inf
-    while share < 1.0 and apart >= _TOUCH:
+    share = 0.0
+    while share < 1.0:
         body.setTransform(_on_arc(begin, along, end, turn, share))
         apart = fcl.distance(body, other, _APART, fcl.DistanceResult())
-        if _touches(body, other):
-            apart = 0.0
+        if apart < _TOUCH or _touches(body, other):
+            return True
         share += min(apart / max(most, apart), 1.0 / 8.0)
-    body.setTransform(_pose(begin, along))
-    return bool(apart < _TOUCH)
+    return False
 
 
 def _on_arc(begin: Floats, along: Floats, end: Floats, turn: float, share: float) -> fcl.Transform:

@@ -212,6 +212,17 @@ def test_what_is_met_in_the_last_state_only_is_found() -> None:
     assert "Collision" in kinds(faults(problem, Plan(states, controls), CAR))
 
 
+def test_what_stands_on_a_pebble_is_found() -> None:
+    """A piece that FCL's distance calls met, and its other answer does not."""
+    state = [[2.238052017725064, 3.6457692976253426, -0.4056464341343755, 0.0, -0.08213364781794763]]
+    pebble = [[3.850145133568554, 3.4432248424533496], [3.850482831042956, 3.4430009870359295]]
+    pebble += [[3.8517018021036376, 3.44283314825566], [3.8509331893488117, 3.4464538512883176]]
+    ((_, corners),) = _corners(np.array(state), CAR)
+    assert shapely.Polygon(corners).intersects(shapely.Polygon(pebble))
+    problem = problem_with(obstacles_of([[np.array(pebble)]]), WIDE)
+    assert "Collision" in kinds(faults(problem, Plan(np.array(state), np.empty((0, 2))), CAR))
+
+
 def _corners(states: Floats, vehicle: Vehicle) -> list[tuple[str, Floats]]:
     return [
         (body.name, np.array(polygon.exterior.coords[:-1]))
