@@ -48,22 +48,19 @@ def read_map(
         unknown: what cells are of which the map knows nothing.
 
     Raises:
-        UsageError: The path is none, or ``unknown`` is something else.
+        UsageError: The path is none, or holds worlds, or ``unknown`` is something else.
         ValueError: The resolution is no number.
-        StorageError: The file is missing or no map, or the resolution is out of its range.
+        StorageError: The file is missing or unreadable, or the resolution is out of its range.
         RunError: SciPy is not installed.
     """
     try:
         from storage.worlds.importing import ImportSettings, load_map  # late, as below
+        from tasks.requests.route_request import map_source
     except ModuleNotFoundError as error:
         raise RunError(f"Maps need {error.name}: pip install 'motion-memory[optimise]'.") from None
-    from storage.worlds.sources import source_at
-
     check_path("path", path)
     check_known("unknown", [unknown], ("free", "occupied"))
-    source = source_at(Path(path))
-    if not source.is_map:
-        raise StorageError(f"{path} is no map: give a .map, .yaml (ROS), .npy or .npz file.")
+    source = map_source(Path(path), None, "read_map")
     cells_m = None if resolution is None else number_of(resolution, "resolution")
     return load_map(source, ImportSettings(resolution=cells_m, unknown=unknown))
 

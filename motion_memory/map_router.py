@@ -3,40 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
 from motion_memory.array_problems import motion_given, numbers_given
-from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.leg_search import Solve
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
-from planners.search.query import Limits
 from planners.world.alignment import scaled
 from planners.world.arrays import Point, Pose
-from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Plan, Problem
-from planners.world.problem_faults import arrival_fault
+from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
-from storage.worlds.limits import LARGEST_CELL_M, SMALLEST_CELL_M
-from tasks.attempts.judged_attempts import check_attempt
+from storage.worlds.limits import check_resolution, check_size
 from tasks.requests.map_routes import (
-    at_rest,
+    LocalSolver,
     canonical_map,
     check_drives_backwards,
     check_route,
     checked_motion,
     in_frame_of,
-    stop_at,
+    stops_over,
 )
 from tasks.settings.checks import is_number
 from tasks.settings.errors import UsageError
-
-Solve = Callable[[Problem, Limits], Attempt]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,17 +77,11 @@ class MapRouter:
         check_drives_backwards(vehicle)
         if not (is_number(tolerance_m) and tolerance_m >= 0.0):
             raise UsageError(f"tolerance_m is {short(tolerance_m)}; give metres, 0 or more.")
-        self._world, self._solve, self._vehicle, self._judged, self._seed = (
-            world,
-            solve,
-            vehicle,
-            judged,
-            seed,
-        )
-        self._scale = scale_for_vehicle(scale, vehicle)
+        self._world, self._scale = world, scale_for_vehicle(scale, vehicle)
+        self._vehicle, self._judged, self._seed = vehicle, judged, seed
+        self._solver = LocalSolver(solve, vehicle, self._scale, judged)
         canonical = canonical_map(world, self._scale, "The map")
-        self._local_plans = 0
-        self._router = Router(canonical, self._local, vehicle, tolerance_m / self._scale, polished)
+        self._router = Router(canonical, self._solver, vehicle, tolerance_m / self._scale, polished)
 
     def route(
         self,
@@ -121,39 +110,34 @@ class MapRouter:
         """
         scale = self._scale
         x, y, heading = _finite("start", start, "x, y, heading")
-        radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
+        tolerance = None
         if goal_tolerance is not None:
-            radius, turn = _finite("goal_tolerance", goal_tolerance, "metres, radians")
-        near = scale * GOAL_RADIUS if goal_radius is None else goal_radius
-        for name, value in (("goal_radius", near), ("goal_tolerance", radius), ("goal_tolerance", turn)):
-            if not (is_number(value) and value > 0.0):
+            tolerance = tuple(_finite("goal_tolerance", goal_tolerance, "metres, radians"))
+        least = None if tolerance is None else min(tolerance)
+        for name, value in (("goal_radius", goal_radius), ("goal_tolerance", least)):
+            if value is not None and not (is_number(value) and value > 0.0):
                 raise UsageError(f"{name} is {short(value)}; give numbers above 0, or leave it out.")
-        posed = at_rest(turn, motion_given("goal_hitches", goal_hitches, "angles, one for each trailer"))
-        fault = arrival_fault(posed, scale, self._vehicle)
-        if fault is not None:
-            raise UsageError(f"The {fault}.")
-        stops = [stop_at(self._world, goal, near, radius, posed, scale) for goal in _goals(goals)]
+        hitches = motion_given("goal_hitches", goal_hitches, "angles, one for each trailer")
+        try:
+            stops = stops_over(
+                self._world, _goals(goals), self._vehicle, scale, goal_radius, tolerance, hitches
+            )
+        except ValueError as error:
+            raise UsageError(f"The {error}.") from None
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
-        self._local_plans = 0
+        self._solver.seconds.clear()
         began = perf_counter()
         route = self._router.route((x / scale, y / scale, heading), stops, motion)
         seconds = perf_counter() - began
         if isinstance(route, Stuck):
             why = route.told(self._world, scale)
-            return RouteAnswer("stuck", None, None, why, self._local_plans, seconds)
+            return RouteAnswer("stuck", None, None, why, len(self._solver.seconds), seconds)
         plan = route.plan(self._vehicle)
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
         driven = scaled(in_frame_of(self._world, plan, scale), scale)
-        return RouteAnswer("solved", route.source, driven, None, self._local_plans, seconds)
-
-    def _local(self, problem: Problem, limits: Limits) -> Attempt:
-        """Attempt a local problem, have its plan judged, and count it."""
-        problem = replace(problem, scale=self._scale)
-        attempt = self._solve(problem, limits)
-        self._local_plans += 1
-        return check_attempt(problem, attempt, set(), self._vehicle) if self._judged else attempt
+        return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds)
 
 
 def _finite(name: str, given: Sequence[float], *meanings: str) -> list[float]:
@@ -169,20 +153,18 @@ def _check_map(world: OccupancyMap) -> None:
     if not isinstance(world, OccupancyMap):
         raise UsageError(f"The map is {short(world)}; give an OccupancyMap, such as read_map returns.")
     occupied = world.occupied
-    if (
-        not isinstance(occupied, np.ndarray)
-        or occupied.dtype != np.bool_
-        or occupied.ndim != 2
-        or not occupied.size
-    ):
+    is_grid = isinstance(occupied, np.ndarray) and occupied.dtype == np.bool_ and occupied.ndim == 2
+    if not (is_grid and occupied.size):
         raise UsageError(
             "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest."
         )
-    if not (is_number(world.resolution) and SMALLEST_CELL_M <= world.resolution <= LARGEST_CELL_M):
-        raise UsageError(
-            f"The map's resolution is {short(world.resolution)}; give metres a cell, {SMALLEST_CELL_M:g} to "
-            f"{LARGEST_CELL_M:g}."
-        )
+    if not is_number(world.resolution):
+        raise UsageError(f"The map's resolution is {short(world.resolution)}; give metres a cell.")
+    try:
+        check_size(*occupied.shape)
+        check_resolution(world.resolution)
+    except ValueError as error:
+        raise UsageError(f"The map {error}.") from None
     _finite("origin of the map", world.origin, "x, y, turn")
 
 

@@ -65,7 +65,7 @@ def motion_fault(problem: Problem, vehicle: Vehicle) -> str | None:
     """Return what is wrong with the motion at the start, which the vehicle must be able to have, or None."""
     names = state_names(vehicle)[3:]
     if len(problem.start_motion) > len(names):
-        return f"the start has {len(problem.start_motion)} numbers of motion, expected {', '.join(names)}"
+        return f"start has {len(problem.start_motion)} numbers of motion, expected {', '.join(names)}"
     for name, value in zip(names, problem.start_motion, strict=False):
         low, high = _limits(name, vehicle)
         if not low <= value <= high:

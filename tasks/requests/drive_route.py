@@ -5,49 +5,36 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from dashboards.cells import CellTable
-from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
-from planners.search.query import Limits
 from planners.world.arrays import Pose
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
-from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
-from tasks.requests.map_routes import canonical_map, check_drives_backwards, check_route, in_frame_of
+from tasks.requests.map_routes import (
+    LocalSolver,
+    canonical_map,
+    check_drives_backwards,
+    check_route,
+    in_frame_of,
+)
 from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
 from tasks.requests.route_summary import legs_from_memory, route_summary, route_table
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
-
-
-@dataclass
-class _Solver:
-    """Solves a route's local problems, and notes the planning time of each."""
-
-    assistant: Assistant
-    scale: float  # metres of the map in a canonical metre
-    seconds: list[float] = field(default_factory=list)  # planning time of each attempt
-
-    def __call__(self, problem: Problem, limits: Limits) -> Attempt:
-        """Solve a problem as the assistant is set, check the plan, and note the time."""
-        attempt = self.assistant.attempt(replace(problem, scale=self.scale), limits=limits)
-        attempt = check_attempt(problem, attempt, set(), self.assistant.vehicle)
-        self.seconds.append(attempt.planning_seconds)
-        return attempt
 
 
 class DrivenRoute(NamedTuple):
@@ -95,7 +82,9 @@ def drive_route(
     stops = stops_of(request, world, assistant.vehicle, scale)
     motion = motion_of(request, assistant.vehicle, scale)
     canonical = canonical_map(world, scale, str(path))
-    solver = _Solver(assistant, scale)
+    solver = LocalSolver(
+        lambda problem, limits: assistant.attempt(problem, limits=limits), assistant.vehicle, scale
+    )
 
     def router_over(each: OccupancyMap) -> Router:
         tolerance_m = settings.tolerance_m / scale

@@ -4,21 +4,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
+from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.leg_search import Solve
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.route import Route
+from planners.search.query import Limits
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import NO_OBSTACLES
-from planners.world.problem import Arrival, Plan, Problem
-from planners.world.problem_faults import motion_fault
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Plan, Problem
+from planners.world.problem_faults import arrival_fault, motion_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of
-from tasks.attempts.judged_attempts import PlanFaultError
+from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.settings.errors import UsageError
 
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
+
+
+@dataclass
+class LocalSolver:
+    """Solves a route's local problems, has their plans judged, and notes the planning time of each."""
+
+    solve: Solve
+    vehicle: Vehicle
+    scale: float  # metres of the map in a canonical metre
+    judged: bool = True
+    seconds: list[float] = field(default_factory=list)  # planning time of each attempt
+
+    def __call__(self, problem: Problem, limits: Limits) -> Attempt:
+        """Attempt a problem in canonical metres. Raises PlanFaultError if its plan is refused."""
+        problem = replace(problem, scale=self.scale)
+        attempt = self.solve(problem, limits)
+        if self.judged:
+            attempt = check_attempt(problem, attempt, set(), self.vehicle)
+        self.seconds.append(attempt.planning_seconds)
+        return attempt
 
 
 def check_drives_backwards(vehicle: Vehicle) -> None:
@@ -47,39 +71,46 @@ def canonical_map(world: OccupancyMap, scale: float, name: str) -> OccupancyMap:
     return canonical
 
 
-def at_rest(tolerance: float, hitches: Sequence[float]) -> Arrival:
-    """What a pose asks for besides place and heading: to stand, trailers at the ``hitches``, if any (rad).
-
-    ``tolerance`` (rad) is that of the heading and of the hitches.
-    """
-    allowed = tuple(tolerance for _ in hitches)
-    return AT_REST._replace(heading_tolerance=tolerance, hitches=tuple(hitches), hitch_tolerances=allowed)
-
-
-def stop_at(
+def stops_over(
     world: OccupancyMap,
-    goal: Sequence[float],
-    place_radius: float,
-    pose_radius: float,
-    posed: Arrival,
+    goals: Sequence[Sequence[float]],
+    vehicle: Vehicle,
     scale: float,
-) -> Stop:
-    """A goal in the map's frame as a stop in canonical metres of its grid.
+    place_radius: float | None = None,
+    pose_tolerance: Sequence[float] | None = None,
+    hitches: Sequence[float] = (),
+) -> list[Stop]:
+    """Goals in the map's frame as stops in canonical metres of its grid.
 
     Args:
         world: the map.
-        goal: x, y in metres, and for a pose the heading.
-        place_radius: metres by which a place may be missed.
-        pose_radius: metres by which a pose may be missed.
-        posed: what a pose asks for besides place and heading.
+        goals: x, y in metres each: a place; or x, y, heading: a pose.
+        vehicle: must be able to stand as the poses ask.
         scale: metres of the map in a canonical one.
+        place_radius: metres by which places may be missed; None: the usual.
+        pose_tolerance: metres and radians by which poses may be missed; None: the usual.
+        hitches: how each trailer stands in poses, rad, within the same radians; none: as they come.
+
+    Raises:
+        ValueError: it cannot; a clause.
     """
-    x, y, *heading = goal
-    right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
-    place = right / scale, up / scale
-    if not heading:
-        return Stop(place, place_radius / scale)
-    return Stop(place, pose_radius / scale, posed._replace(heading=facing))
+    near = scale * GOAL_RADIUS if place_radius is None else place_radius
+    radius, turn = pose_tolerance or (scale * POSE_RADIUS, POSE_TOLERANCE)
+    posed = AT_REST._replace(
+        heading_tolerance=turn, hitches=tuple(hitches), hitch_tolerances=tuple(turn for _ in hitches)
+    )
+    fault = arrival_fault(posed, scale, vehicle)
+    if fault is not None:
+        raise ValueError(fault)
+    stops = []
+    for x, y, *heading in goals:
+        right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
+        place = right / scale, up / scale
+        if heading:
+            stops.append(Stop(place, radius / scale, posed._replace(heading=facing)))
+        else:
+            stops.append(Stop(place, near / scale))
+    return stops
 
 
 def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> tuple[float, ...]:
@@ -98,7 +129,7 @@ def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> t
     start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, canonical)
     fault = motion_fault(start, vehicle)
     if fault is not None:
-        raise UsageError(f"The {fault.removeprefix('the ')}.")
+        raise UsageError(f"The {fault}.")
     return canonical
 
 

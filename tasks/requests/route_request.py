@@ -11,14 +11,13 @@ from typing import Any, Final, NamedTuple
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.world.arrays import Pose
-from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE
-from planners.world.problem_faults import arrival_fault
+from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE
 from planners.world.vehicles.vehicle import Vehicle, name_of, trailers_of
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, Source, source_at
-from tasks.requests.map_routes import at_rest, checked_motion, stop_at
+from tasks.requests.map_routes import checked_motion, stops_over
 from tasks.settings.checks import check_known
 from tasks.settings.errors import UsageError
 
@@ -57,34 +56,35 @@ def start_of(request: RouteRequest) -> Pose:
 
 def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale: float) -> list[Stop]:
     """The goals of a request for a vehicle over a map, in canonical metres of its grid. Raises UsageError."""
-    radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
+    tolerance = None
     if request.goal_tolerance is not None:
-        radius, turn = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
-        if not (radius > 0.0 and turn > 0.0):
+        tolerance = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
+        if not min(tolerance) > 0.0:
             raise UsageError(
                 f"--goal-tolerance {request.goal_tolerance!r}: give numbers above 0, or leave it out for "
                 f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
             )
-        _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
+        _warn(degrees_hint("--goal-tolerance", tolerance[1], ANY_HEADING, "which any heading is within"))
     hitches, trailers = tuple(request.goal_hitch), len(trailers_of(vehicle))
     if len(hitches) not in (0, trailers):
         raise UsageError(
             f"--goal-hitch is given {len(hitches)} times, but {name_of(vehicle)} has {trailers} trailers; "
             "give it once for each, or leave it out."
         )
-    posed = at_rest(turn, hitches)
-    fault = arrival_fault(posed, scale, vehicle)
-    if fault is not None:
-        raise UsageError(f"--goal-hitch: {fault}.")
-    near = scale * GOAL_RADIUS if request.goal_radius is None else request.goal_radius
-    if not 0.0 < near < math.inf:
+    near = request.goal_radius
+    if near is not None and not 0.0 < near < math.inf:
         raise UsageError(f"--goal-radius is {near:g}; give metres above 0, or leave it out.")
-    stops = []
-    for goal in request.goals:
-        x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
+    goals = [
+        _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
+        for goal in request.goals
+    ]
+    for _, _, *heading in goals:
         if heading:
             _warn(degrees_hint("The heading of --to", heading[0]))
-        stops.append(stop_at(world, (x, y, *heading), near, radius, posed, scale))
+    try:
+        stops = stops_over(world, goals, vehicle, scale, near, tolerance, hitches)
+    except ValueError as error:
+        raise UsageError(f"--goal-hitch: {error}.") from None
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
     for option, given in (("tolerance", request.goal_tolerance is not None), ("hitch", bool(hitches))):
