@@ -118,10 +118,9 @@ class MapRouter:
             if value is not None and not (is_number(value) and value > 0.0):
                 raise UsageError(f"{name} is {short(value)}; give numbers above 0, or leave it out.")
         hitches = motion_given("goal_hitches", goal_hitches, "angles, one for each trailer")
+        asked = _goals(goals)
         try:
-            stops = stops_over(
-                self._world, _goals(goals), self._vehicle, scale, goal_radius, tolerance, hitches
-            )
+            stops = stops_over(self._world, asked, self._vehicle, scale, goal_radius, tolerance, hitches)
         except ValueError as error:
             raise UsageError(f"The {error}.") from None
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)

@@ -95,8 +95,8 @@ def test_where_it_is_stuck_is_told(world: motion_memory.OccupancyMap, router: An
     [
         ({"start": (1.0, 2.0)}, "start"),
         ({"start": (1.0, 2.0, math.nan)}, "start"),
-        ({"goals": []}, "goals"),
-        ({"goals": (3.0, 4.0)}, "goals"),
+        ({"goals": []}, "^goals is"),
+        ({"goals": (3.0, 4.0)}, "^goals is"),
         ({"goals": [(3.0, 4.0, 0.0, 1.0)]}, "goals"),
         ({"goals": "there"}, "goals"),
         ({"goal_radius": 0.0}, "goal_radius"),
