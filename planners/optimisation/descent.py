@@ -23,7 +23,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import control_limits, load, step, store
+from planners.world.vehicles.dynamics import control_limits, load, numbers_of, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 TRIES: Final = 6  # shares 1, 1/2 ... of a change that are tried
@@ -66,7 +66,7 @@ def _cost(
 def drive_changed(model: Model, steps: int, share: float, last: LastMotion, vehicle: Vehicle) -> None:
     """Drive with a share of the change, and its feedback, into ``model.tried_states``."""
     states, tried = model.states, model.tried_states
-    size = states.shape[1]
+    size = numbers_of(states, vehicle)
     most_0, most_1 = control_limits(vehicle)
     for c in range(size):
         tried[0, c] = states[0, c]
@@ -167,12 +167,11 @@ def descend(
         if anew:
             aim = aim_from(model, steps, goal)
             differentiate_steps(model, steps, vehicle)
+            cost = miss(model.states[steps, 0], model.states[steps, 1], aim)
             for k in range(1, steps + 1):
-                differentiate_nearness(model, k, vehicle, scene, circles, barrier)
+                cost += effort(model.controls[k - 1, 0], model.controls[k - 1, 1], vehicle)
+                cost += differentiate_nearness(model, k, vehicle, scene, circles, barrier)
             pull(model, steps, aim)
-            cost = _cost(
-                *(model.states, model.controls, steps, aim, vehicle, scene, circles, barrier, math.inf)
-            )
         linear, quadratic = sweep_back(model, steps, ANY_MOTION, damping, 0.0, False, vehicle)
         used += 1
         if -(linear + quadratic) < stage.least_gain:

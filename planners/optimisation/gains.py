@@ -12,7 +12,14 @@ from typing import Final, NamedTuple
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
-from planners.world.vehicles.dynamics import State, admissible, control_limits, load, within_ranges
+from planners.world.vehicles.dynamics import (
+    State,
+    admissible,
+    control_limits,
+    load,
+    numbers_of,
+    within_ranges,
+)
 from planners.world.vehicles.interface import kept_within
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -95,7 +102,7 @@ def sweep_back(
         vehicle: what is driven.
     """
     states, controls = model.states, model.controls
-    size = states.shape[1]
+    size = numbers_of(states, vehicle)
     gradient, ahead, slope, turned = model.vectors[1], model.vectors[2], model.vectors[3], model.vectors[4]
     hessian, product = model.squares[0], model.squares[1]
     most_first, most_second = control_limits(vehicle)
@@ -224,7 +231,7 @@ def _can_end(
     return first, kept_within(second, state[4], -most_turn, most_turn, vehicle.dt)
 
 
-@lean
+@inlined
 def _feed_back(
     model: Model,
     k: int,
@@ -259,7 +266,7 @@ def _feed_back(
     free_0 = low[0] < change_0 < high[0]
     free_1 = low[1] < change_1 < high[1]
     feedback = model.feedback[k]
-    size = model.states.shape[1]
+    size = numbers_of(model.states, vehicle)
     if free_0 and free_1:
         determinant = h00 * h11 - h01 * h01
         for c in range(size):

@@ -60,6 +60,28 @@ def gap_along(axis: Axis, box: Box) -> float:
 
 
 @inlined
+def gap_slope(axis: Axis, box: Box) -> Box:
+    """How ``gap_along`` changes with each of the six numbers of a box."""
+    kind, p, q, _ = axis
+    x, y, cos, sin, half_length, half_width = box
+    if kind == FIXED_NORMAL:
+        ahead = p * cos + q * sin
+        left = q * cos - p * sin
+        # a side that lies along the normal comes nearer whichever way the box turns: here to the left
+        along = half_length if ahead > 0.0 or (ahead == 0.0 and left > 0.0) else -half_length
+        across = half_width if left > 0.0 or (left == 0.0 and ahead < 0.0) else -half_width
+        return p, q, -along * p - across * q, across * p - along * q, -abs(ahead), -abs(left)
+    elif kind == AHEAD:
+        return -cos, -sin, p - x, q - y, -1.0, 0.0
+    elif kind == BEHIND:
+        return cos, sin, x - p, y - q, -1.0, 0.0
+    elif kind == LEFT:
+        return sin, -cos, q - y, x - p, 0.0, -1.0
+    else:
+        return -sin, cos, y - q, p - x, 0.0, -1.0
+
+
+@inlined
 def wall(k: int, bounds: Floats) -> Axis:
     """The inner side of one of the four ``bounds [4]`` as an axis."""
     if k == 0:

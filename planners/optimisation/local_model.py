@@ -7,12 +7,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.optimisation.gaps import Axis, Barrier, gap_along, nearness, wall, widest_gap
-from planners.world.arrays import Floats
+from planners.optimisation.gaps import Axis, Barrier, gap_along, gap_slope, nearness, wall, widest_gap
+from planners.world.arrays import Box, Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import lateral_acceleration, load, step, swept_bodies
+from planners.world.vehicles.dynamics import lateral_acceleration, load, numbers_of, step, swept_bodies
 from planners.world.vehicles.vehicle import Vehicle
 
 NEVER: Final = 1 << 30  # steps, of a drive that there is not
@@ -40,7 +40,9 @@ class Model(NamedTuple):
     vectors: Floats  # [6, S] scratch
     squares: Floats  # [2, S, S] scratch
     nudged: Floats  # [1, S] scratch
-    boxes: Floats  # [S, S - 4, 6] scratch: the bodies of a state of which one number is nudged
+    by_number: (
+        Floats  # [S, S - 4, 6] scratch: how the numbers of each body's box change with those of a state
+    )
 
 
 def allocate_model(steps: int, size: int) -> Model:
@@ -66,7 +68,7 @@ def allocate_model(steps: int, size: int) -> Model:
 def differentiate_steps(model: Model, steps: int, vehicle: Vehicle) -> None:
     """Fill in the derivatives of all steps."""
     states, controls = model.states, model.controls
-    size = len(load(states, 0, vehicle))  # known when compiling, so that loops over it are unrolled
+    size = numbers_of(states, vehicle)
     nudged = model.nudged
     for k in range(steps):
         by_state = model.by_state[k]
@@ -121,7 +123,7 @@ def nearness_cost(
             if dx * dx + dy * dy < near * near:
                 gap, _ = widest_gap(box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far)
                 cost += nearness(gap - barrier.margin_m, barrier)[0]
-    for h in range(5, states.shape[1]):
+    for h in range(5, numbers_of(states, vehicle)):
         cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH)[0]
     most = vehicle.max_lateral_acceleration
     if most < math.inf:
@@ -133,10 +135,10 @@ def nearness_cost(
 @lean
 def differentiate_nearness(
     model: Model, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
-) -> None:
-    """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``."""
+) -> float:
+    """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``, and return it."""
     states = model.states
-    size = len(load(states, 0, vehicle))
+    size = numbers_of(states, vehicle)
     gradient = model.gradient[i]
     curvature = model.curvature[i]
     for r in range(size):
@@ -145,18 +147,19 @@ def differentiate_nearness(
             curvature[r, c] = 0.0
     bounds = scene.bounds
     far = barrier.range_m + barrier.margin_m
-    is_near = False  # whether the boxes are nudged
+    cost = 0.0
+    is_near = False  # whether it is known how the boxes change
     for body, box in enumerate(swept_bodies(load(states, i, vehicle), vehicle)):
         x = box[0]
         y = box[1]
         reach = length(box[4], box[5]) + far
         if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
             if not is_near:
-                _nudge_boxes(model, i, vehicle)
+                _differentiate_boxes(model, i, vehicle)
                 is_near = True
             for k in range(4):
                 axis = wall(k, bounds)
-                _add_gap(model, i, body, axis, gap_along(axis, box), barrier)
+                cost += _add_gap(model, i, body, box, axis, gap_along(axis, box), barrier, vehicle)
         for p in range(circles.shape[0]):
             dx = x - circles[p, 0]
             dy = y - circles[p, 1]
@@ -169,18 +172,20 @@ def differentiate_nearness(
                     continue
                 gap, axis = widest_gap(box, first, last, scene.edges, far)
                 if not is_near:
-                    _nudge_boxes(model, i, vehicle)
+                    _differentiate_boxes(model, i, vehicle)
                     is_near = True
-                _add_gap(model, i, body, axis, gap, barrier)
+                cost += _add_gap(model, i, body, box, axis, gap, barrier, vehicle)
     for h in range(5, size):
         hitch = states[i, h]
-        _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
+        value, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
+        cost += value
         gradient[h] += -slope if hitch > 0.0 else slope
         curvature[h, h] += bend
     most = vehicle.max_lateral_acceleration
     if most < math.inf:
         lateral, by_speed, by_turn = lateral_acceleration(load(states, i, vehicle), vehicle)
-        _, slope, bend = nearness(1.0 - abs(lateral) / most, SLIDING)
+        value, slope, bend = nearness(1.0 - abs(lateral) / most, SLIDING)
+        cost += value
         per_unit = (-1.0 if lateral > 0.0 else 1.0) / most  # how the share that is left changes
         by_speed *= per_unit
         by_turn *= per_unit
@@ -190,41 +195,52 @@ def differentiate_nearness(
         curvature[3, 4] += bend * by_speed * by_turn
         curvature[4, 3] += bend * by_speed * by_turn
         curvature[4, 4] += bend * by_turn * by_turn
+    return cost
+
+
+@lean
+def _differentiate_boxes(model: Model, i: int, vehicle: Vehicle) -> None:
+    """Fill in how the bodies of state ``i`` change with speed, steering and hitch angles.
+
+    How they move with the pose needs no buffer: all of them move and turn as one.
+    """
+    nudged = model.nudged
+    size = numbers_of(model.states, vehicle)
+    for c in range(size):
+        nudged[0, c] = model.states[i, c]
+    bodies = swept_bodies(load(nudged, 0, vehicle), vehicle)
+    for c in range(3, size):
+        nudge = -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
+        nudged[0, c] += nudge
+        for body, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
+            for n in range(6):
+                model.by_number[c, body, n] = (box[n] - bodies[body][n]) / nudge
+        nudged[0, c] = model.states[i, c]
 
 
 @inlined
-def _nudge(c: int) -> float:
-    return -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
-
-
-@lean
-def _nudge_boxes(model: Model, i: int, vehicle: Vehicle) -> None:
-    """Fill in the bodies of state ``i`` with one of its numbers nudged, for each number."""
-    nudged = model.nudged
-    size = len(load(model.states, 0, vehicle))
-    for c in range(size):
-        nudged[0, c] = model.states[i, c]
-    for c in range(size):
-        nudged[0, c] += _nudge(c)
-        for body, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
-            for n in range(6):
-                model.boxes[c, body, n] = box[n]
-        nudged[0, c] = model.states[i, c]
-
-
-@lean
-def _add_gap(model: Model, i: int, body: int, axis: Axis, gap: float, barrier: Barrier) -> None:
-    """Add what the gap (metres) of a body along an axis contributes."""
-    _, slope, bend = nearness(gap - barrier.margin_m, barrier)
+def _add_gap(
+    model: Model, i: int, body: int, box: Box, axis: Axis, gap: float, barrier: Barrier, vehicle: Vehicle
+) -> float:
+    """Add what the gap (metres) of a body's box along an axis contributes; returns what it costs."""
+    cost, slope, bend = nearness(gap - barrier.margin_m, barrier)
     if bend == 0.0:
-        return
-    size = model.states.shape[1]
+        return cost
+    size = numbers_of(model.states, vehicle)
+    by_box = gap_slope(axis, box)
     by_state = model.vectors[0]
-    for c in range(size):
-        box = model.boxes[c, body]
-        moved = gap_along(axis, (box[0], box[1], box[2], box[3], box[4], box[5]))
-        by_state[c] = (moved - gap) / _nudge(c)
+    by_state[0] = by_box[0]
+    by_state[1] = by_box[1]
+    x = box[0] - model.states[i, 0]
+    y = box[1] - model.states[i, 1]
+    by_state[2] = by_box[1] * x - by_box[0] * y + by_box[3] * box[2] - by_box[2] * box[3]
+    for c in range(3, size):
+        change = 0.0
+        for n in range(6):
+            change += by_box[n] * model.by_number[c, body, n]
+        by_state[c] = change
     for r in range(size):
         model.gradient[i, r] += slope * by_state[r]
         for c in range(size):
             model.curvature[i, r, c] += bend * by_state[r] * by_state[c]
+    return cost

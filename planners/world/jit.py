@@ -29,7 +29,7 @@ from numba.core.caching import (
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, compile_result
 from numba.core.registry import CPUDispatcher
-from numba.extending import overload, typeof_impl
+from numba.extending import intrinsic, overload, typeof_impl
 
 from planners.world.compiling import listen
 
@@ -252,6 +252,19 @@ def unseen(kind: type) -> None:
     So settings that differ in such values alone run the same compiled code.
     """
     typeof_impl.register(kind)(lambda _value, _context: types.none)
+
+
+def replacing(field: str) -> Callable[..., Any]:
+    """Make a kernel that takes a named tuple and a number, and gives the tuple with that in a field."""
+
+    @intrinsic
+    def replaced(_typing: Any, whole: Any, _number: Any) -> Any:
+        def insert(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            return builder.insert_value(*arguments, whole.fields.index(field))
+
+        return whole(whole, types.float64), insert
+
+    return replaced
 
 
 _implementations: dict[Callable[..., Any], dict[type, Callable[..., Any]]] = {}

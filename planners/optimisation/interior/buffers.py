@@ -12,8 +12,8 @@ import numpy as np
 
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
-from planners.world.jit import inlined, jit
-from planners.world.vehicles.dynamics import control_limits, turn_limit
+from planners.world.jit import inlined, lean
+from planners.world.vehicles.dynamics import control_limits, numbers_of, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 LIMITED: Final = 4  # numbers of a step that have limits: both controls, then speed and steering after it
@@ -78,7 +78,7 @@ def value_of(states: Floats, controls: Floats, k: int, number: int) -> float:
     return float(states[k + 1, number + 1])
 
 
-@jit
+@lean
 def begin_inside(model: Model, interior: Interior, steps: int, barrier: float, vehicle: Vehicle) -> None:
     """Move every number inside its limits, with the multipliers that belong to the ``barrier``."""
     for k in range(steps):
@@ -95,7 +95,7 @@ def begin_inside(model: Model, interior: Interior, steps: int, barrier: float, v
             interior.multipliers[k, 2 * number + 1] = barrier / (high - value)
 
 
-@jit
+@lean
 def accept_change(model: Model, interior: Interior, steps: int, strength: float, vehicle: Vehicle) -> None:
     """Take ``model.tried_states`` over, and change the multipliers by as much as keeps them positive."""
     share = 1.0
@@ -117,7 +117,7 @@ def accept_change(model: Model, interior: Interior, steps: int, strength: float,
     for k in range(steps):
         for c in range(2):
             model.controls[k, c] = model.tried_controls[k, c]
-        for c in range(model.states.shape[1]):
+        for c in range(numbers_of(model.states, vehicle)):
             model.states[k + 1, c] = model.tried_states[k + 1, c]
         for number in range(LIMITED):
             low, high = limits_of(number, vehicle)

@@ -18,8 +18,8 @@ from planners.optimisation.local_model import (
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, MOST_TURN, RADIUS
-from planners.world.jit import inlined, jit, lean
-from planners.world.vehicles.dynamics import load, step, turn_limit
+from planners.world.jit import inlined, lean
+from planners.world.vehicles.dynamics import load, numbers_of, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 # metres; what it costs to be full speed off the speed that is asked at the end, or to turn at full rate where
@@ -98,36 +98,14 @@ def cost_of(
         cost -= strength * math.log(product)
         cost += nearness_cost(states, k + 1, vehicle, scene, circles, hold.barrier)
     aim_near(states[steps], goal, aim, hold.inside)
-    for c in range(states.shape[1]):
+    for c in range(numbers_of(states, vehicle)):
         off = states[steps, c] - aim[c]
         if off != 0.0:
             cost += 0.5 * weight_of_error(c, goal, hold, vehicle) * off * off
     return cost
 
 
-@jit
-def present_cost(
-    model: Model,
-    interior: Interior,
-    steps: int,
-    goal: Floats,
-    strength: float,
-    time_counts: float,
-    vehicle: Vehicle,
-    scene: Scene,
-    circles: Floats,
-    hold: Hold,
-) -> float:
-    """What the drive in ``model.states`` costs; arguments as of ``cost_of``."""
-    return float(
-        cost_of(
-            *(model.states, model.controls, steps, goal, interior.aim, strength, time_counts),
-            *(vehicle, scene, circles, hold),
-        )
-    )
-
-
-@jit
+@lean
 def try_change(
     model: Model,
     interior: Interior,
@@ -143,7 +121,7 @@ def try_change(
 ) -> tuple[float, float]:
     """Fill in ``model.tried_states`` with a share of the change. Returns its cost and the sum of its gaps."""
     states, controls = model.tried_states, model.tried_controls
-    size = states.shape[1]
+    size = numbers_of(states, vehicle)
     for c in range(size):
         states[0, c] = model.states[0, c]
     for k in range(steps):
@@ -177,7 +155,7 @@ def differentiate(
 ) -> None:
     """Fill in gaps and derivatives; ``longer`` is the vehicle with a step that is a little longer."""
     differentiate_steps(model, steps, vehicle)
-    size = model.states.shape[1]
+    size = numbers_of(model.states, vehicle)
     for k in range(steps):
         here = load(model.states, k, vehicle)
         first = model.controls[k, 0]

@@ -15,8 +15,8 @@ from planners.optimisation.interior.costs import Hold, differentiate, weight_of_
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
-from planners.world.jit import jit, lean
-from planners.world.vehicles.dynamics import control_limits, load
+from planners.world.jit import inlined, lean
+from planners.world.vehicles.dynamics import control_limits, numbers_of
 from planners.world.vehicles.vehicle import Vehicle
 
 NEARLY: Final = 0.95  # the share of the way to a limit that a change goes at most
@@ -27,7 +27,7 @@ MORE_DAMPING: Final = 8.0  # times as much, if a sweep finds no least cost
 LEAST_DAMPING: Final = 1e-3  # of those
 
 
-@lean
+@inlined
 def _limits_push(
     model: Model, interior: Interior, k: int, number: int, strength: float, vehicle: Vehicle
 ) -> tuple[float, float]:
@@ -57,7 +57,7 @@ def _sweep_back(
 
     The change of the length of a step is the same for all, so it is carried along to the first state.
     """
-    size = len(load(model.states, 0, vehicle))  # known when compiling, so that loops over it are unrolled
+    size = numbers_of(model.states, vehicle)
     hessian, product, before = interior.squares[0], interior.squares[1], interior.squares[2]
     vectors = interior.vectors
     gradient, mixed, ahead, slope = vectors[0], vectors[1], vectors[2], vectors[3]
@@ -175,7 +175,7 @@ def _sweep_back(
 @lean
 def _sweep_forward(model: Model, interior: Interior, steps: int, longer_s: float, vehicle: Vehicle) -> float:
     """Fill in the change of states and controls. Returns the largest multiplier of the steps' gaps."""
-    size = len(load(model.states, 0, vehicle))
+    size = numbers_of(model.states, vehicle)
     change = interior.change
     most = 0.0
     for c in range(size):
@@ -202,7 +202,7 @@ def _sweep_forward(model: Model, interior: Interior, steps: int, longer_s: float
     return most
 
 
-@jit
+@lean
 def direction(
     model: Model,
     interior: Interior,
@@ -253,7 +253,7 @@ def direction(
         return damping, 0.0, 0.0, 0.0, 0.0, 0.0
     price = _sweep_forward(model, interior, steps, longer_s, vehicle)
     most_0, most_1 = control_limits(vehicle)
-    size = model.states.shape[1]
+    size = numbers_of(model.states, vehicle)
     share = 1.0
     gaps = 0.0
     slope = time_counts * steps * vehicle.max_speed * longer_s

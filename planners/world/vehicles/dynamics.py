@@ -17,6 +17,7 @@ from planners.world.vehicles.interface import curvature_of as curvature_of
 from planners.world.vehicles.interface import is_folded as is_folded
 from planners.world.vehicles.interface import lateral_acceleration as lateral_acceleration
 from planners.world.vehicles.interface import load as load
+from planners.world.vehicles.interface import numbers_of as numbers_of
 from planners.world.vehicles.interface import sharpest_at as sharpest_at
 from planners.world.vehicles.interface import slides as slides
 from planners.world.vehicles.interface import step as step
@@ -29,6 +30,7 @@ from planners.world.vehicles.interface import turn_in as turn_in
 from planners.world.vehicles.interface import turn_limit as turn_limit
 from planners.world.vehicles.interface import turn_limit_at as turn_limit_at
 from planners.world.vehicles.interface import turning_speed as turning_speed
+from planners.world.vehicles.interface import with_step as with_step
 from planners.world.vehicles.interface import within_ranges as within_ranges
 from planners.world.vehicles.vehicle import Vehicle
 

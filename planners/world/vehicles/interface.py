@@ -10,10 +10,11 @@ entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is aske
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from planners.world.arrays import Box, Floats
-from planners.world.jit import by_vehicle, inlined, unseen
+from planners.world.jit import by_vehicle, inlined, replacing, unseen
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.vehicle import About, Vehicle
 
@@ -23,6 +24,7 @@ SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority r
 ROUNDING: Final = 1e-6  # of the largest lateral acceleration: planners keep off it, and states may pass it
 
 unseen(About)
+with_step: Callable[[Vehicle, float], Vehicle] = replacing("dt")  # only in kernels: with steps so long
 
 
 @by_vehicle
@@ -36,6 +38,12 @@ def store(states: Floats, i: int, state: State) -> None:
     """Write a state into row ``i`` of ``states [T, S]``."""
     for k in range(len(state)):
         states[i, k] = state[k]
+
+
+@inlined
+def numbers_of(states: Floats, vehicle: Vehicle) -> int:
+    """How many numbers a state has: known when compiling, so that loops over them are unrolled."""
+    return len(load(states, 0, vehicle))
 
 
 @by_vehicle

@@ -10,15 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.optimisation.interior.drivable import driven as driven_after
-from planners.optimisation.interior.drivable import in_asked_motion
+from planners.optimisation.interior.drivable import end_in_asked_motion, is_drivable
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import polish
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.goal import goal_of, reaches
-from planners.world.problem import start_state
+from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, Vehicle
 from planners.world.workspace import Workspace
@@ -142,9 +141,8 @@ def test_feedback_keeps_a_drive_within_all_limits(seed: int, off: float, vehicle
     model.states[1:] += rng.normal(0.0, off, model.states[1:].shape)
     model.controls[:] = controls
     model.feedback[:] = rng.normal(0.0, 20.0, model.feedback.shape)
-    found = driven_after(model, 8, goal_of(problem, vehicle), vehicle, scene_of(problem))
-    assert found is not None
-    assert faults(problem, found, vehicle) == []
+    assert is_drivable(model, 8, goal_of(problem, vehicle), vehicle, scene_of(problem))
+    assert faults(problem, Plan(model.tried_states, model.tried_controls, vehicle.dt), vehicle) == []
 
 
 @settings(max_examples=50, deadline=None)
@@ -162,5 +160,5 @@ def test_what_rounding_leaves_of_a_motion_does_not_count(
     controls[-1] += (left - plan.states[-1, 3:5]) / vehicle.dt
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
     last = simulate(start, controls, vehicle)[-1]
-    ended = simulate(start, in_asked_motion(controls, last, goal, vehicle), vehicle)
-    assert reaches(tuple(ended[-1]), goal)
+    end_in_asked_motion(controls, len(controls), last, goal, vehicle)
+    assert reaches(tuple(simulate(start, controls, vehicle)[-1]), goal)

@@ -37,7 +37,8 @@ def test_the_gradient_of_nearness_is_that_of_its_cost(name: str, lateral: float,
     state[:3] = *rng.uniform(2.0, 9.0, 2), rng.uniform(-3.0, 3.0)
     state[4] *= turn_limit(vehicle)
     model.states[1] = state
-    differentiate_nearness(model, 1, vehicle, SCENE, circles, BARRIER)
+    at_once = differentiate_nearness(model, 1, vehicle, SCENE, circles, BARRIER)
+    assert at_once == nearness_cost(model.states, 1, vehicle, SCENE, circles, BARRIER)
 
     def cost(number: int, more: float) -> float:
         moved = state.copy()
