@@ -12,7 +12,8 @@ from planners.world.arrays import Box, Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import lateral_acceleration, load, numbers_of, step, swept_bodies
+from planners.world.vehicles.dynamics import lateral_acceleration, load, numbers_of, swept_bodies
+from planners.world.vehicles.slopes import differentiate_step
 from planners.world.vehicles.vehicle import Vehicle
 
 NEVER: Final = 1 << 30  # steps, of a drive that there is not
@@ -67,37 +68,10 @@ def allocate_model(steps: int, size: int) -> Model:
 @lean
 def differentiate_steps(model: Model, steps: int, vehicle: Vehicle) -> None:
     """Fill in the derivatives of all steps."""
-    states, controls = model.states, model.controls
-    size = numbers_of(states, vehicle)
-    nudged = model.nudged
     for k in range(steps):
-        by_state = model.by_state[k]
-        by_control = model.by_control[k]
-        first = controls[k, 0]
-        second = controls[k, 1]
-        here = load(states, k, vehicle)
-        after = step(here, first, second, vehicle)
-        more_first = step(here, first + NUDGE, second, vehicle)
-        more_second = step(here, first, second + NUDGE, vehicle)
-        for r in range(size):
-            nudged[0, r] = states[k, r]
-            by_control[r, 0] = (more_first[r] - after[r]) / NUDGE
-            by_control[r, 1] = (more_second[r] - after[r]) / NUDGE
-            for c in range(3):
-                by_state[r, c] = 1.0 if r == c else 0.0
-        by_state[0, 2] = states[k, 1] - after[1]  # the step turns with the heading
-        by_state[1, 2] = after[0] - states[k, 0]
-        for c in range(3, size):
-            nudged[0, c] += NUDGE
-            moved = step(load(nudged, 0, vehicle), first, second, vehicle)
-            nudged[0, c] = states[k, c]
-            for r in range(size):
-                by_state[r, c] = (moved[r] - after[r]) / NUDGE
-        for r in range(3, 5):  # linear, whatever ``step`` clamps
-            for c in range(size):
-                by_state[r, c] = 1.0 if r == c else 0.0
-            by_control[r, 0] = vehicle.dt if r == 3 else 0.0
-            by_control[r, 1] = vehicle.dt if r == 4 else 0.0
+        here = load(model.states, k, vehicle)
+        first, second = model.controls[k, 0], model.controls[k, 1]
+        differentiate_step(here, first, second, vehicle, model.by_state[k], model.by_control[k])
 
 
 @lean

@@ -12,7 +12,6 @@ from planners.optimisation.interior.buffers import LIMITED, Interior, limits_of,
 from planners.optimisation.local_model import (
     Model,
     differentiate_nearness,
-    differentiate_steps,
     nearness_cost,
 )
 from planners.world.arrays import Floats
@@ -20,6 +19,7 @@ from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, MOST_TURN, RADIUS
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import load, numbers_of, step, turn_limit
+from planners.world.vehicles.slopes import differentiate_step
 from planners.world.vehicles.vehicle import Vehicle
 
 # metres; what it costs to be full speed off the speed that is asked at the end, or to turn at full rate where
@@ -154,13 +154,12 @@ def differentiate(
     barrier: Barrier,
 ) -> None:
     """Fill in gaps and derivatives; ``longer`` is the vehicle with a step that is a little longer."""
-    differentiate_steps(model, steps, vehicle)
     size = numbers_of(model.states, vehicle)
     for k in range(steps):
         here = load(model.states, k, vehicle)
         first = model.controls[k, 0]
         second = model.controls[k, 1]
-        after = step(here, first, second, vehicle)
+        after = differentiate_step(here, first, second, vehicle, model.by_state[k], model.by_control[k])
         later = step(here, first, second, longer)
         for c in range(size):
             if 3 <= c < 5:  # linear, whatever ``step`` clamps

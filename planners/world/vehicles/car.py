@@ -34,6 +34,16 @@ def turn_rates(
 
 
 @inlined
+def directions_in(heading: float, turns: tuple[float, float, float], h: float) -> tuple[float, ...]:
+    """Sine and cosine of the headings at the four points of a Runge-Kutta step of ``h`` seconds."""
+    sin_1, cos_1 = sincos(heading)
+    sin_2, cos_2 = turned_by(sin_1, cos_1, 0.5 * h * turns[0])
+    sin_3, cos_3 = turned_by(sin_1, cos_1, 0.5 * h * turns[1])
+    sin_4, cos_4 = turned_by(sin_1, cos_1, h * turns[1])
+    return sin_1, cos_1, sin_2, cos_2, sin_3, cos_3, sin_4, cos_4
+
+
+@inlined
 def drive(
     x: float,
     y: float,
@@ -45,10 +55,7 @@ def drive(
 ) -> tuple[float, float, float]:
     """The pose after a Runge-Kutta step of ``h`` seconds with the turn rates of ``turn_rates``."""
     half_speed = 0.5 * (speed + end_speed)
-    sin_1, cos_1 = sincos(heading)
-    sin_2, cos_2 = turned_by(sin_1, cos_1, 0.5 * h * turns[0])
-    sin_3, cos_3 = turned_by(sin_1, cos_1, 0.5 * h * turns[1])
-    sin_4, cos_4 = turned_by(sin_1, cos_1, h * turns[1])
+    sin_1, cos_1, sin_2, cos_2, sin_3, cos_3, sin_4, cos_4 = directions_in(heading, turns, h)
     return (
         x + h / 6.0 * (speed * cos_1 + 2.0 * half_speed * (cos_2 + cos_3) + end_speed * cos_4),
         y + h / 6.0 * (speed * sin_1 + 2.0 * half_speed * (sin_2 + sin_3) + end_speed * sin_4),
@@ -96,6 +103,13 @@ def _within_ranges(state: State, first: float, second: float, vehicle: CarLike) 
         kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
         kept_within(second, state[4], -vehicle.max_steering, vehicle.max_steering, vehicle.dt),
     )
+
+
+@implements(interface.turn_rate, Car, CarWithTrailers)
+def _turn_rate(speed: float, turn: float, vehicle: CarLike) -> tuple[float, float, float]:
+    slope = tan(turn)
+    per_slope = speed / vehicle.wheelbase
+    return per_slope * slope, slope / vehicle.wheelbase, per_slope * (1.0 + slope * slope)
 
 
 @implements(interface.lateral_acceleration, Car, CarWithTrailers)

@@ -52,7 +52,20 @@ def _second_hitch(state: State) -> float:
 
 
 @inlined
-def _hitch_rates(speed: float, turn: float, hitches: Three, lengths: Three) -> Three:
+def hitches_of(state: State) -> Three:
+    """The hitch angle of each trailer."""
+    return state[5], _second_hitch(state), state[-1]
+
+
+@inlined
+def hitch_lengths(vehicle: CarWithTrailers) -> Three:
+    """How far each trailer's axle is behind its hitch, in metres."""
+    trailers = vehicle.trailers
+    return trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
+
+
+@inlined
+def hitch_rates(speed: float, turn: float, hitches: Three, lengths: Three) -> Three:
     """Beta' (rad/s) of each trailer at the car's speed and turn rate."""
     sin_1, cos_1 = sincos(hitches[0])
     sin_2, cos_2 = sincos(hitches[1])
@@ -64,7 +77,7 @@ def _hitch_rates(speed: float, turn: float, hitches: Three, lengths: Three) -> T
 
 
 @inlined
-def _after(hitches: Three, h: float, rates: Three) -> Three:
+def after_rates(hitches: Three, h: float, rates: Three) -> Three:
     """The hitch angles ``h`` seconds later at constant rates."""
     return hitches[0] + h * rates[0], hitches[1] + h * rates[1], hitches[2] + h * rates[2]
 
@@ -77,13 +90,12 @@ def _runge_kutta(start: float, h: float, k1: float, k2: float, k3: float, k4: fl
 @inlined
 def _hitches_after(h: float, speeds: Three, turns: Three, state: State, vehicle: CarWithTrailers) -> Three:
     """The hitch angles ``h`` seconds later; speeds and turn rates of the car at beginning, middle and end."""
-    trailers = vehicle.trailers
-    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
-    hitches = state[5], _second_hitch(state), state[-1]
-    k = _hitch_rates(speeds[0], turns[0], hitches, lengths)
-    p = _hitch_rates(speeds[1], turns[1], _after(hitches, 0.5 * h, k), lengths)
-    q = _hitch_rates(speeds[1], turns[1], _after(hitches, 0.5 * h, p), lengths)
-    r = _hitch_rates(speeds[2], turns[2], _after(hitches, h, q), lengths)
+    lengths = hitch_lengths(vehicle)
+    hitches = hitches_of(state)
+    k = hitch_rates(speeds[0], turns[0], hitches, lengths)
+    p = hitch_rates(speeds[1], turns[1], after_rates(hitches, 0.5 * h, k), lengths)
+    q = hitch_rates(speeds[1], turns[1], after_rates(hitches, 0.5 * h, p), lengths)
+    r = hitch_rates(speeds[2], turns[2], after_rates(hitches, h, q), lengths)
     return (
         _runge_kutta(hitches[0], h, k[0], p[0], q[0], r[0]),
         _runge_kutta(hitches[1], h, k[1], p[1], q[1], r[1]),
@@ -126,9 +138,9 @@ def _is_folded(state: State, vehicle: CarWithTrailers) -> bool:
     speed = state[3]
     if speed == 0.0:  # it may begin at a limit, and at rest nothing folds
         return False
-    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
+    lengths = hitch_lengths(vehicle)
     turn = speed * tan(state[4]) / vehicle.wheelbase
-    rates = _hitch_rates(speed, turn, (state[5], _second_hitch(state), state[-1]), lengths)
+    rates = hitch_rates(speed, turn, hitches_of(state), lengths)
     bends = _hitch_bends(state, lengths, vehicle)
     return (
         _may_fold_between(room_1, rates[0], bends[0], vehicle)
@@ -196,7 +208,7 @@ def _behind(
 @implements(interface.swept_bodies, CarWithTrailers)
 def _swept_bodies(state: State, vehicle: CarWithTrailers) -> tuple[Box, ...]:
     pose, speed, turn = swept_motion(state, vehicle)
-    hitches = state[5], _second_hitch(state), state[-1]
+    hitches = hitches_of(state)
     if vehicle.first_order:  # those in the middle of the step into the state, too
         rate = state[3] * tan(state[4]) / vehicle.wheelbase
         speeds = (state[3], state[3], state[3])

@@ -65,6 +65,11 @@ def _within_ranges(
     )
 
 
+@implements(interface.turn_rate, DifferentialDrive)
+def _turn_rate(speed: float, turn: float, vehicle: DifferentialDrive) -> tuple[float, float, float]:
+    return turn, 0.0, 1.0
+
+
 @implements(interface.lateral_acceleration, DifferentialDrive)
 def _lateral_acceleration(state: State, vehicle: DifferentialDrive) -> tuple[float, float, float]:
     return state[3] * state[4], state[4], state[3]

@@ -29,6 +29,7 @@ from planners.world.vehicles.interface import turn_error as turn_error
 from planners.world.vehicles.interface import turn_in as turn_in
 from planners.world.vehicles.interface import turn_limit as turn_limit
 from planners.world.vehicles.interface import turn_limit_at as turn_limit_at
+from planners.world.vehicles.interface import turn_rate as turn_rate
 from planners.world.vehicles.interface import turning_speed as turning_speed
 from planners.world.vehicles.interface import with_step as with_step
 from planners.world.vehicles.interface import within_ranges as within_ranges

@@ -74,6 +74,15 @@ def within_ranges(state: State, first: float, second: float, vehicle: Vehicle) -
 
 
 @by_vehicle
+def turn_rate(speed: float, turn: float, vehicle: Vehicle) -> tuple[float, float, float]:
+    """The turn rate (rad/s) at a speed (m/s) and a fifth variable.
+
+    Returns this, and its derivatives by speed and by the fifth variable.
+    """
+    raise NotImplementedError
+
+
+@by_vehicle
 def lateral_acceleration(state: State, vehicle: Vehicle) -> tuple[float, float, float]:
     """How strongly the reference point is accelerated to the left (m/s^2).
 
