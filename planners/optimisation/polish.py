@@ -30,7 +30,7 @@ ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 1000  # where a drive must arrive as asked; some 60 suffice mostly
 GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
 NEAR_ITERATIONS: Final = 30  # of these while time counts: if that does not suffice, it mostly is in vain
-SLICE: Final = 8  # iterations between two looks at the clock
+SLICE: Final = 8  # iterations between two looks at the clock, where there is a limit
 MUCH: Final = 0.97  # of its steps: a drive that is pressed to so few may get quicker from there
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
@@ -283,7 +283,7 @@ def _descended(
         stage = Stage(barrier._replace(strength=strength, range_m=range_m, contact=strength), least_gain)
         ended = False
         while not ended and used < iterations and working_clock() < until:
-            most = min(SLICE, iterations - used)
+            most = min(iterations if math.isinf(until) else SLICE, iterations - used)
             steps, more, best, ended = descend(
                 *(model, steps, goal, stage, most, best, vehicle, scene, circles)
             )

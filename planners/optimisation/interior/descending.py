@@ -29,7 +29,7 @@ SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radia
 NO_GAPS: Final = 1e-6  # their sum when the last part cannot close them better ...
 NO_GAIN: Final = 1e-2  # ... if so little is left to gain, in metres
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
-SLICE: Final = 4  # iterations between two looks at the clock
+SLICE: Final = 4  # iterations between two looks at the clock, where there is a limit
 
 Holds = tuple[Hold, Hold, Hold]
 
@@ -91,10 +91,11 @@ def descend(
     last = len(firm) if time_counts else 1
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
     going = Going(0, vehicle.dt, 0, strength, math.nan)
+    slices = iterations if math.isinf(drive.until) else SLICE
     while not going.ended and going.used < iterations and working_clock() <= drive.until:
         going = _descend_some(
             *(model, drive.interior, steps, drive.goal, drive.asked, holds, last),
-            *(1.0 if time_counts else 0.0, vehicle, drive.scene, drive.circles, going, iterations),
+            *(1.0 if time_counts else 0.0, vehicle, drive.scene, drive.circles, going, slices, iterations),
         )
     if not going.found:
         return going.dt, going.used, None
@@ -116,14 +117,15 @@ def _descend_some(
     scene: Scene,
     circles: Floats,
     going: Going,
+    more: int,
     iterations: int,
 ) -> Going:
-    """Go on for a ``SLICE`` of the ``iterations``; ``last`` is the number of the last hold."""
+    """Go on for some ``more`` of the ``iterations``; ``last`` is the number of the last hold."""
     used, dt, number, strength, cost, damping, price, in_vain, ended, found = going
     vehicle = with_step(given, dt)
     if used == 0:
         begin_inside(model, interior, steps, strength, vehicle)
-    until = min(used + SLICE, iterations)
+    until = min(used + more, iterations)
     while used < until and not ended:
         used += 1
         hold = holds[number]

@@ -17,6 +17,7 @@ STANDING_M: Final = 1e-6  # a step that is shorter stands still
 SPEED_SHARE: Final = 0.98  # of full speed
 ACCELERATION_SHARE: Final = 0.95  # of the largest acceleration
 FINE: Final = 200  # pieces of a run for which its time is summed up
+SHARES: Final = np.linspace(0.0, 1.0, FINE + 1)
 LEAST_STEPS: Final = 2  # of a run
 
 
@@ -52,7 +53,7 @@ def _run(
     top = SPEED_SHARE * (-vehicle.min_speed if backwards else vehicle.max_speed)
     acceleration = ACCELERATION_SHARE * control_limits(vehicle)[0]
     along = np.concatenate([[0.0], np.cumsum(metres)])
-    at = np.linspace(0.0, along[-1], FINE + 1)
+    at = along[-1] * SHARES
     reached = np.sqrt(speeds[0] ** 2 + 2.0 * acceleration * at)
     left = np.sqrt(speeds[1] ** 2 + 2.0 * acceleration * (along[-1] - at))
     speed = np.minimum(np.minimum(reached, left), top)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
+from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, step, store, top_speed, turn_in
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -15,6 +16,8 @@ STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles t
 LEAST: Final = 0.001  # of it: the stride of a vehicle that hardly moves in a step
 COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
 FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
+# where a part of an arc leads from the origin: pose, speed, fifth variable
+Leap = tuple[float, float, float, float, float]
 
 
 @inlined
@@ -40,32 +43,64 @@ def at_pace(state: State, speed: float, bend: float, vehicle: Vehicle) -> State:
     return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle), *state[5:])
 
 
+class Stride(NamedTuple):
+    """A stride of an arc: from one look at obstacles to the next."""
+
+    metres: float
+    bend: float
+    speed: float  # m/s with which it is driven in a step, negative backwards
+    whole: Leap
+    fine: Leap  # ``FINE`` of them
+
+
 @inlined
-def stride_along(
-    state: State, gear: float, bend: float, metres: float, vehicle: Vehicle, scene: Scene
-) -> tuple[State, float, int]:
-    """Drive on for some metres along an arc, as far as it is free.
+def _leap_of(state: State, speed: float, bend: float, vehicle: Vehicle) -> Leap:
+    origin = at_pace((0.0, 0.0, 0.0, *state[3:]), speed, bend, vehicle)
+    after = step(origin, 0.0, 0.0, vehicle)
+    return after[0], after[1], after[2], after[3], after[4]
+
+
+@inlined
+def stride_in(state: State, gear: float, bend: float, metres: float, vehicle: Vehicle) -> Stride:
+    """The stride of so many ``metres``, at most ``stride_of``, in a gear (1 or -1); any ``state`` will do."""
+    speed = gear * metres / vehicle.dt
+    whole = _leap_of(state, speed, bend, vehicle)
+    return Stride(metres, bend, speed, whole, _leap_of(state, speed / FINE, bend, vehicle))
+
+
+@inlined
+def _leapt(state: State, leap: Leap, speed: float, bend: float, vehicle: Vehicle) -> State:
+    """The state after a leap, or where there are trailers after the step that it stands for."""
+    if len(state) > 5:  # decided when compiling
+        return step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    else:
+        sin, cos = sincos(state[2])
+        x = state[0] + cos * leap[0] - sin * leap[1]
+        y = state[1] + sin * leap[0] + cos * leap[1]
+        return x, y, state[2] + leap[2], leap[3], leap[4]
+
+
+@inlined
+def stride_along(state: State, stride: Stride, vehicle: Vehicle, scene: Scene) -> tuple[State, float, int]:
+    """Drive on for a stride of an arc, as far as it is free.
 
     Where a look with the margin of the whole stride finds no room, there are ``FINE`` short ones.
 
     Args:
         state: from where.
-        gear: 1 forwards, -1 backwards.
-        bend: of the arc.
-        metres: of the stride, at most that of ``stride_of``.
+        stride: of the arc.
         vehicle: what is driven.
         scene: what must not be met.
 
     Returns:
         The last free state, how many metres were free, and how often obstacles were looked at.
     """
-    speed = gear * metres / vehicle.dt
-    after = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    metres, bend = stride.metres, stride.bend
+    after = _leapt(state, stride.whole, stride.speed, bend, vehicle)
     if state_is_free(after, vehicle, scene):
         return after, metres, 1
-    speed /= FINE
     for k in range(FINE):
-        after = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+        after = _leapt(state, stride.fine, stride.speed / FINE, bend, vehicle)
         if not state_is_free(after, vehicle, scene):
             return state, k * metres / FINE, k + 2
         state = after

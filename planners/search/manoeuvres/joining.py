@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import COARSE, at_pace, stride_along, stride_of
+from planners.search.manoeuvres.arcs import COARSE, at_pace, stride_along, stride_in, stride_of
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
@@ -238,10 +238,10 @@ def arcs_are_free(start: Floats, join: Join, vehicle: Vehicle, scene: Scene) -> 
     for k in range(join.counts[ARCS]):
         gear = join.arcs[0, k]
         count = math.ceil(join.arcs[2, k] / stride_of(gear, vehicle))
+        stride = stride_in(state, gear, join.arcs[1, k], join.arcs[2, k] / max(count, 1), vehicle)
         for _ in range(count):
-            stride = join.arcs[2, k] / count
-            state, free, checks = stride_along(state, gear, join.arcs[1, k], stride, vehicle, scene)
+            state, free, checks = stride_along(state, stride, vehicle, scene)
             looks += checks
-            if free < stride:
+            if free < stride.metres:
                 return False, looks
     return True, looks

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
-from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of
+from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_in, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
@@ -26,7 +26,7 @@ from planners.search.manoeuvres.pose_tree import (
     region_of,
     seconds_after,
 )
-from planners.search.manoeuvres.shots import FromStart, shoot, shoot_between
+from planners.search.manoeuvres.shots import FromStart, shoot_between, shoot_with_trailers
 from planners.search.manoeuvres.ways import slowest_kept
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
@@ -62,15 +62,16 @@ def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scen
     free = 0.0
     whole = 0.0
     for gear in GEARS:
-        stride = stride_of(gear, outgoing)
-        if stride <= 0.0:
+        long = stride_of(gear, outgoing)
+        if long <= 0.0:
             continue
         for share in (1.0, 0.0, -1.0):
             state = load(states, 0, vehicle)
+            stride = stride_in(state, gear, share * bend_limit, long, outgoing)
             metres = 0.0
-            more = stride
-            while metres < vehicle.front + vehicle.rear and more == stride:
-                state, more, _ = stride_along(state, gear, share * bend_limit, stride, outgoing, scene)
+            more = long
+            while metres < vehicle.front + vehicle.rear and more == long:
+                state, more, _ = stride_along(state, stride, outgoing, scene)
                 metres += more
             free += metres
             whole += vehicle.front + vehicle.rear
@@ -170,8 +171,8 @@ def open_node(
     bend_limit = tightest_bend(turning_speed(vehicle), vehicle)
     size = vehicle.front + vehicle.rear
     for gear in GEARS:
-        stride = settings.stride * stride_of(gear, outgoing)
-        if stride <= 0.0:
+        long = settings.stride * stride_of(gear, outgoing)
+        if long <= 0.0:
             continue
         for share in settings.bends:
             bend = share * bend_limit
@@ -181,17 +182,18 @@ def open_node(
             tree.counts[CHECKS] += 1
             if not state_is_free(at_pace(state, 0.0, bend, vehicle), vehicle, scene):
                 continue  # where the wheels cannot be turned
+            stride = stride_in(state, gear, bend, long, outgoing)
             metres = 0.0
             before = 0.0
             mark = 0
             while mark < len(settings.marks):
-                state, free, checks = stride_along(state, gear, bend, stride, outgoing, scene)
+                state, free, checks = stride_along(state, stride, outgoing, scene)
                 tree.counts[CHECKS] += checks
                 metres += free
-                ended = free < stride
+                ended = free < long
                 if ended or metres >= settings.marks[mark] * STRIDE * size - 1e-9:
                     mark += 1
-                    if metres - before >= 2.0 * stride / FINE and not (ended and vehicle.min_speed > 0.0):
+                    if metres - before >= 2.0 * long / FINE and not (ended and vehicle.min_speed > 0.0):
                         longest = mark == len(settings.marks) and not ended
                         way = gear * metres
                         _wait(
@@ -280,7 +282,7 @@ def grow_outward(
                 if meet(before, last, after, first, known.endings, goal, drive, vehicle, scene):
                     return True, expansions
                 note_near(drive.near, before, last, after, first, vehicle)
-            if known.outward and shoot(other, 0, tree, node, known, goal, drive, vehicle, scene):
+            if known.outward and shoot_with_trailers(other, tree, node, known, goal, drive, vehicle, scene):
                 return True, expansions
         elif shoot_between(tree, node, other, known, goal, drive, vehicle, scene):
             return True, expansions

@@ -14,7 +14,7 @@ from planners.search.connection.candidates import (
 from planners.search.connection.connection import Connection, first_pose, radius_at
 from planners.search.connection.outline import outline_is_free
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import stride_along, stride_of
+from planners.search.manoeuvres.arcs import stride_along, stride_in, stride_of
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goal
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.joining import arcs_are_free, close, take_word, trailers_are_off
@@ -24,7 +24,7 @@ from planners.search.query import Endings
 from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
-from planners.world.jit import lean
+from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import load, tightest_bend, turning_speed
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -64,16 +64,16 @@ def word_is_free(
             continue
         gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
         count = math.ceil(metres / stride_of(gear, vehicle))
-        stride = metres / count
+        stride = stride_in(state, gear, word[k] * bend_limit, metres / count, vehicle)
         for _ in range(count):
-            state, free, checks = stride_along(state, gear, word[k] * bend_limit, stride, vehicle, scene)
+            state, free, checks = stride_along(state, stride, vehicle, scene)
             tree.counts[CHECKS] += checks
-            if free < stride:
+            if free < stride.metres:
                 return False
     return True
 
 
-@lean
+@inlined
 def _shoot_alone(
     before: PoseTree,
     last: int,
@@ -112,7 +112,7 @@ def _shoot_alone(
 
 
 @lean
-def _shoot_with_trailers(
+def shoot_with_trailers(
     before: PoseTree,
     tree: PoseTree,
     node: int,
@@ -159,28 +159,6 @@ def _shoot_with_trailers(
 
 
 @lean
-def shoot(
-    before: PoseTree,
-    last: int,
-    tree: PoseTree,
-    node: int,
-    known: FromStart,
-    goal: Floats,
-    drive: Drive,
-    vehicle: Vehicle,
-    scene: Scene,
-) -> bool:
-    """Try words to a node of the tree out of the goal, and drive the first that is free, and on to the goal.
-
-    The words begin at node ``last`` of the tree out of the start; with trailers at the start itself.
-    """
-    if len(load(tree.states, node, vehicle)) > 5:  # decided when compiling
-        return _shoot_with_trailers(before, tree, node, known, goal, drive, vehicle, scene)
-    else:
-        return _shoot_alone(before, last, tree, node, known, goal, drive, vehicle, scene)
-
-
-@lean
 def shoot_between(
     tree: PoseTree,
     node: int,
@@ -192,12 +170,10 @@ def shoot_between(
     scene: Scene,
 ) -> bool:
     """Shoot between a node of one tree and the other tree: its root, and the node that it opened last."""
-    for last in (0, other.counts[LAST]):
-        if known.outward:
-            arrives = shoot(other, last, tree, node, known, goal, drive, vehicle, scene)
-        else:
-            arrives = shoot(tree, node, other, last, known, goal, drive, vehicle, scene)
-        if arrives:
+    before, after = (other, tree) if known.outward else (tree, other)
+    for opened in (0, other.counts[LAST]):
+        last, first = (opened, node) if known.outward else (node, opened)
+        if _shoot_alone(before, last, after, first, known, goal, drive, vehicle, scene):
             return True
         if other.counts[LAST] == 0:
             break
