@@ -237,6 +237,8 @@ def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a kernel that allocates nothing, without reference counts for arrays.
 
     Counting a reference to each array of each tuple that is passed on would cost more than a collision check.
+    So does passing on many arrays, of seven and more numbers each: what is called for each step of a drive,
+    each gap or each word is ``inlined``, or takes few.
     """
     return _compiled(function, _LEAN)
 

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from planners.world.arrays import Floats
+from planners.world.jit import jit
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import bend_of, control_limits, top_speed
 from planners.world.vehicles.vehicle import Vehicle
@@ -50,24 +51,59 @@ def _run(
     way: Floats, metres: Floats, backwards: bool, speeds: tuple[float, float], vehicle: Vehicle
 ) -> Floats:
     """The states of a run after its first; ``speeds`` at its ends in m/s, not negative."""
-    top = SPEED_SHARE * (-vehicle.min_speed if backwards else vehicle.max_speed)
-    acceleration = ACCELERATION_SHARE * control_limits(vehicle)[0]
     along = np.concatenate([[0.0], np.cumsum(metres)])
-    at = along[-1] * SHARES
-    reached = np.sqrt(speeds[0] ** 2 + 2.0 * acceleration * at)
-    left = np.sqrt(speeds[1] ** 2 + 2.0 * acceleration * (along[-1] - at))
-    speed = np.minimum(np.minimum(reached, left), top)
+    tops = np.full(FINE + 1, SPEED_SHARE * (-vehicle.min_speed if backwards else vehicle.max_speed))
     if math.isfinite(vehicle.max_lateral_acceleration):
-        bends = np.interp(at, along, [bend_of(tuple(state), vehicle) for state in way])
-        slow = SPEED_SHARE * np.array(
-            [top_speed(-1.0 if backwards else 1.0, bend, vehicle) for bend in bends]
-        )
-        squares = slow**2 + 2.0 * acceleration * np.abs(at[:, np.newaxis] - at)
-        speed = np.minimum(speed, np.sqrt(squares.min(axis=1)))
-    seconds = np.concatenate([[0.0], np.cumsum(np.diff(at) / (0.5 * (speed[1:] + speed[:-1])))])
-    steps = max(math.ceil(seconds[-1] / vehicle.dt), LEAST_STEPS)
-    times = np.linspace(0.0, seconds[-1], steps + 1)[1:]
-    places = np.interp(times, seconds, at)
-    states = np.column_stack([np.interp(places, along, column) for column in way.T])
-    states[:, 3] = np.interp(times, seconds, speed) * (-1.0 if backwards else 1.0)
+        bends = np.interp(along[-1] * SHARES, along, [bend_of(tuple(state), vehicle) for state in way])
+        gear = -1.0 if backwards else 1.0
+        tops = np.minimum(tops, SPEED_SHARE * np.array([top_speed(gear, bend, vehicle) for bend in bends]))
+    tops[0], tops[-1] = min(tops[0], speeds[0]), min(tops[-1], speeds[1])
+    acceleration = ACCELERATION_SHARE * control_limits(vehicle)[0]
+    states = _quickest(way, along, tops, acceleration, vehicle.dt)
+    if backwards:
+        states[:, 3] *= -1.0
+    return states
+
+
+@jit
+def _quickest(way: Floats, along: Floats, tops: Floats, acceleration: float, dt: float) -> Floats:
+    """The states ``[K, S]`` after the first on a way, with forward speeds, as quickly as they can be driven.
+
+    Args:
+        way: ``[T, S]`` states.
+        along: ``[T]`` where these are on the way, in metres.
+        tops: ``[FINE + 1]`` the largest speeds at places equally far from each other, in m/s; changed here.
+        acceleration: the largest, m/s^2.
+        dt: length of a step in seconds, at most.
+    """
+    pieces = tops.shape[0] - 1
+    piece = along[-1] / pieces
+    more = 2.0 * acceleration * piece  # of the square of a speed, from one place to the next
+    for i in range(pieces):
+        tops[i + 1] = min(tops[i + 1], math.sqrt(tops[i] * tops[i] + more))
+    for i in range(pieces - 1, -1, -1):
+        tops[i] = min(tops[i], math.sqrt(tops[i + 1] * tops[i + 1] + more))
+    whole = 0.0
+    for i in range(pieces):
+        whole += 2.0 * piece / (tops[i] + tops[i + 1])
+    steps = max(math.ceil(whole / dt), LEAST_STEPS)
+    states = np.empty((steps, way.shape[1]))
+    i = 0  # the piece that is driven
+    row = 0  # and the part of the way
+    before = 0.0  # seconds until the piece begins
+    takes = 2.0 * piece / (tops[0] + tops[1])
+    for k in range(steps):
+        seconds = whole * (k + 1) / steps
+        while i < pieces - 1 and seconds > before + takes:
+            before += takes
+            i += 1
+            takes = 2.0 * piece / (tops[i] + tops[i + 1])
+        share = min((seconds - before) / takes, 1.0)
+        place = (i + share) * piece
+        while row < along.shape[0] - 2 and place > along[row + 1]:
+            row += 1
+        part = min((place - along[row]) / (along[row + 1] - along[row]), 1.0)
+        for c in range(way.shape[1]):
+            states[k, c] = way[row, c] + part * (way[row + 1, c] - way[row, c])
+        states[k, 3] = tops[i] + share * (tops[i + 1] - tops[i])
     return states

@@ -151,8 +151,9 @@ def test_it_says_what_parts_of_plans_had_for_a_question(
     stored = load_library(library, CAR)
     told = {}
     pose = Arrival(CANONICAL_START[2], 0.05)
-    seeds = (0, 1, 2, 3)  # recalled twice; no parts are found; a search finds a quicker plan
-    for question in [replace(strewn(seed, 60), arrival=pose) for seed in seeds]:
+    for question in (replace(strewn(seed, 60), arrival=pose) for seed in range(2, 20)):
+        if len(told) == 3:  # recalled; no parts are found; a search finds a quicker plan
+            break
         write_problems(tmp_path / "one.json", [question])
         asked = ["plan", str(tmp_path / "one.json"), "--memory", str(library), "--assist", "closed"]
         assert call([*asked, "--explain"]) == 0
