@@ -135,10 +135,11 @@ def descend(
     stage: Stage,
     iterations: int,
     best: int,
+    damping: float,
     vehicle: Vehicle,
     scene: Scene,
     circles: Floats,
-) -> tuple[int, int, int, bool]:
+) -> tuple[int, int, int, float, bool]:
     """Shorten the drive in ``model.states`` and ``model.controls`` as far as it will go.
 
     Args:
@@ -148,18 +149,18 @@ def descend(
         stage: how obstacles push, and when to end.
         iterations: at most.
         best: steps of the free drive that is kept already, a large number if there is none.
+        damping: of the first change; 0, or that of an earlier call that this one goes on from.
         vehicle: what is driven.
         scene: what must not be met.
         circles: ``[P, 3]`` around the scene's pieces.
 
     Returns:
-        Steps of the drive, iterations used, steps of the quickest free drive, and whether more iterations
-        would gain nothing.
+        Steps of the drive, iterations used, steps of the quickest free drive, the damping with which to go
+        on, and whether more iterations would gain nothing.
     """
     barrier = stage.barrier
     used = 0
     ended = False
-    damping = 0.0
     anew = True
     aim = aim_from(model, steps, goal)
     cost = 0.0
@@ -212,4 +213,4 @@ def descend(
             if steps < best and count_free_prefix(driven, vehicle, scene) == steps + 1:
                 best = steps
                 copy_drive(model.states, model.controls, steps, model.best_states, model.best_controls)
-    return steps, used, best, ended
+    return steps, used, best, damping, ended

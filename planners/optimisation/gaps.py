@@ -67,7 +67,7 @@ def gap_slope(axis: Axis, box: Box) -> Box:
     if kind == FIXED_NORMAL:
         ahead = p * cos + q * sin
         left = q * cos - p * sin
-        # a side that lies along the normal comes nearer whichever way the box turns: here to the left
+        # where a side is parallel to the obstacle both turns bring it nearer; this is the left one's slope
         along = half_length if ahead > 0.0 or (ahead == 0.0 and left > 0.0) else -half_length
         across = half_width if left > 0.0 or (left == 0.0 and ahead < 0.0) else -half_width
         return p, q, -along * p - across * q, across * p - along * q, -abs(ahead), -abs(left)

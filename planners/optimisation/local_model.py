@@ -17,7 +17,7 @@ from planners.world.vehicles.slopes import differentiate_step
 from planners.world.vehicles.vehicle import Vehicle
 
 NEVER: Final = 1 << 30  # steps, of a drive that there is not
-NUDGE: Final = 1e-6  # of a state or control, for derivatives by differences
+NUDGE: Final = 1e-6  # of a number of a state, for derivatives of boxes by differences
 HITCH: Final = Barrier(0.01, 0.2, 0.0, 0.0, 0.01)  # radians instead of metres
 SLIDING: Final = Barrier(0.002, 0.1, 0.0, 0.0, 0.002)  # shares of the largest lateral acceleration
 
@@ -41,7 +41,7 @@ class Model(NamedTuple):
     vectors: Floats  # [6, S] scratch
     squares: Floats  # [2, S, S] scratch
     nudged: Floats  # [1, S] scratch
-    by_number: (
+    box_slopes: (
         Floats  # [S, S - 4, 6] scratch: how the numbers of each body's box change with those of a state
     )
 
@@ -110,7 +110,7 @@ def nearness_cost(
 def differentiate_nearness(
     model: Model, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
 ) -> float:
-    """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``, and return it."""
+    """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``; returns it."""
     states = model.states
     size = numbers_of(states, vehicle)
     gradient = model.gradient[i]
@@ -188,7 +188,7 @@ def _differentiate_boxes(model: Model, i: int, vehicle: Vehicle) -> None:
         nudged[0, c] += nudge
         for body, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
             for n in range(6):
-                model.by_number[c, body, n] = (box[n] - bodies[body][n]) / nudge
+                model.box_slopes[c, body, n] = (box[n] - bodies[body][n]) / nudge
         nudged[0, c] = model.states[i, c]
 
 
@@ -211,7 +211,7 @@ def _add_gap(
     for c in range(3, size):
         change = 0.0
         for n in range(6):
-            change += by_box[n] * model.by_number[c, body, n]
+            change += by_box[n] * model.box_slopes[c, body, n]
         by_state[c] = change
     for r in range(size):
         model.gradient[i, r] += slope * by_state[r]

@@ -237,14 +237,14 @@ def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a kernel that allocates nothing, without reference counts for arrays.
 
     Counting a reference to each array of each tuple that is passed on would cost more than a collision check.
-    So does passing on many arrays, of seven and more numbers each: what is called for each step of a drive,
-    each gap or each word is ``inlined``, or takes few.
+    So may passing on many arrays, of seven and more numbers each, for each step of a drive or each gap:
+    ``inlined`` then.
     """
     return _compiled(function, _LEAN)
 
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a small ``lean`` kernel into its callers, because a call would cost more than its work."""
+    """Compile a ``lean`` kernel into its callers, because a call and its arguments cost more than it."""
     return _compiled(function, _INLINED)
 
 
@@ -257,7 +257,7 @@ def unseen(kind: type) -> None:
 
 
 def replacing(field: str) -> Callable[..., Any]:
-    """Make a kernel that takes a named tuple and a number, and gives the tuple with that in a field."""
+    """Make a kernel that takes a named tuple and a float, and gives the tuple with that as its ``field``."""
 
     @intrinsic
     def replaced(_typing: Any, whole: Any, _number: Any) -> Any:

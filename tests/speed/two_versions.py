@@ -5,8 +5,9 @@
 ``VEHICLE:FAMILY:DIFFICULTY``, or ``VEHICLE:KIND:CLASS`` with a kind of ``canonical``, ``place`` and ``pose``.
 
 The lattice solves each problem once with either version, directly one after the other, so that both meet the
-same load of the machine; which one begins changes from problem to problem. Compiling does not count. The
-judge of each version looks at its plans. With a library, whole drives of it are moved to the problems.
+same load of the machine; which one begins changes from problem to problem. Six problems of another seed come
+before, and compiling does not count. The judge of each version looks at its plans. With a library, whole
+drives of it are moved to the problems.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -39,7 +39,7 @@ HEADINGS: Final = (
     "ms, mean",
     "median",
     "99 %",
-    "less ms",
+    "less time",
     "driving s",
     "sooner s",
     "refused",
@@ -101,10 +101,11 @@ def main() -> None:
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--memory", type=lambda path: Path(path).resolve())
     asked = parser.parse_args()
-    table = Table(*HEADINGS, box=SIMPLE_HEAD)
+    console = Console(width=190)
     for what in asked.asked:
+        table = Table(*HEADINGS, box=None, show_header=what == asked.asked[0], expand=True)
         rows = measured(what, asked)
-        (planning, driving, wrong) = np.moveaxis(rows, 2, 0)
+        planning, driving, wrong = np.moveaxis(rows, 2, 0)
         solved = np.isfinite(driving)
         both = solved.all(axis=1)
         spent = 1000.0 * planning
@@ -121,9 +122,9 @@ def main() -> None:
             with_interval(1.0 - spent[:, 1] / spent[:, 0], ".0%", np.median),
             " → ".join(f"{value:.3f}" for value in driving[both].mean(axis=0)),
             with_interval(total[:, 0] - total[:, 1], ".3f", np.mean),
-            f"{wrong.sum():.0f}",
+            " → ".join(f"{count:.0f}" for count in wrong.sum(axis=0)),
         )
-    Console(width=190).print(table)
+        console.print(table, end="" if what != asked.asked[-1] else "\n")
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ class Going(NamedTuple):
 
     used: int  # iterations
     dt: float  # length of a step in seconds
-    number: int  # of the hold
+    hold: int  # its number
     strength: float  # of the barrier at limits, in metres
     cost: float  # of the drive, not a number if it is not known
     damping: float = FIRST_DAMPING
@@ -91,11 +91,11 @@ def descend(
     last = len(firm) if time_counts else 1
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
     going = Going(0, vehicle.dt, 0, strength, math.nan)
-    slices = iterations if math.isinf(drive.until) else SLICE
+    at_once = iterations if math.isinf(drive.until) else SLICE
     while not going.ended and going.used < iterations and working_clock() <= drive.until:
         going = _descend_some(
             *(model, drive.interior, steps, drive.goal, drive.asked, holds, last),
-            *(1.0 if time_counts else 0.0, vehicle, drive.scene, drive.circles, going, slices, iterations),
+            *(1.0 if time_counts else 0.0, vehicle, drive.scene, drive.circles, going, at_once, iterations),
         )
     if not going.found:
         return going.dt, going.used, None
@@ -120,7 +120,7 @@ def _descend_some(
     more: int,
     iterations: int,
 ) -> Going:
-    """Go on for some ``more`` of the ``iterations``; ``last`` is the number of the last hold."""
+    """Go on for ``more`` iterations at most, up to ``iterations`` in all; ``last`` numbers the last hold."""
     used, dt, number, strength, cost, damping, price, in_vain, ended, found = going
     vehicle = with_step(given, dt)
     if used == 0:

@@ -59,14 +59,14 @@ def _run(
         tops = np.minimum(tops, SPEED_SHARE * np.array([top_speed(gear, bend, vehicle) for bend in bends]))
     tops[0], tops[-1] = min(tops[0], speeds[0]), min(tops[-1], speeds[1])
     acceleration = ACCELERATION_SHARE * control_limits(vehicle)[0]
-    states = _quickest(way, along, tops, acceleration, vehicle.dt)
+    states = _timed(way, along, tops, acceleration, vehicle.dt)
     if backwards:
         states[:, 3] *= -1.0
     return states
 
 
 @jit
-def _quickest(way: Floats, along: Floats, tops: Floats, acceleration: float, dt: float) -> Floats:
+def _timed(way: Floats, along: Floats, tops: Floats, acceleration: float, dt: float) -> Floats:
     """The states ``[K, S]`` after the first on a way, with forward speeds, as quickly as they can be driven.
 
     Args:

@@ -70,7 +70,7 @@ def stride_in(state: State, gear: float, bend: float, metres: float, vehicle: Ve
 
 @inlined
 def _leapt(state: State, leap: Leap, speed: float, bend: float, vehicle: Vehicle) -> State:
-    """The state after a leap, or where there are trailers after the step that it stands for."""
+    """The state after a leap. With trailers, of which a leap does not tell, the step is simulated."""
     if len(state) > 5:  # decided when compiling
         return step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
     else:

@@ -62,15 +62,15 @@ def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scen
     free = 0.0
     whole = 0.0
     for gear in GEARS:
-        long = stride_of(gear, outgoing)
-        if long <= 0.0:
+        stride_m = stride_of(gear, outgoing)
+        if stride_m <= 0.0:
             continue
         for share in (1.0, 0.0, -1.0):
             state = load(states, 0, vehicle)
-            stride = stride_in(state, gear, share * bend_limit, long, outgoing)
+            stride = stride_in(state, gear, share * bend_limit, stride_m, outgoing)
             metres = 0.0
-            more = long
-            while metres < vehicle.front + vehicle.rear and more == long:
+            more = stride_m
+            while metres < vehicle.front + vehicle.rear and more == stride_m:
                 state, more, _ = stride_along(state, stride, outgoing, scene)
                 metres += more
             free += metres
@@ -171,8 +171,8 @@ def open_node(
     bend_limit = tightest_bend(turning_speed(vehicle), vehicle)
     size = vehicle.front + vehicle.rear
     for gear in GEARS:
-        long = settings.stride * stride_of(gear, outgoing)
-        if long <= 0.0:
+        stride_m = settings.stride * stride_of(gear, outgoing)
+        if stride_m <= 0.0:
             continue
         for share in settings.bends:
             bend = share * bend_limit
@@ -182,7 +182,7 @@ def open_node(
             tree.counts[CHECKS] += 1
             if not state_is_free(at_pace(state, 0.0, bend, vehicle), vehicle, scene):
                 continue  # where the wheels cannot be turned
-            stride = stride_in(state, gear, bend, long, outgoing)
+            stride = stride_in(state, gear, bend, stride_m, outgoing)
             metres = 0.0
             before = 0.0
             mark = 0
@@ -190,10 +190,10 @@ def open_node(
                 state, free, checks = stride_along(state, stride, outgoing, scene)
                 tree.counts[CHECKS] += checks
                 metres += free
-                ended = free < long
+                ended = free < stride_m
                 if ended or metres >= settings.marks[mark] * STRIDE * size - 1e-9:
                     mark += 1
-                    if metres - before >= 2.0 * long / FINE and not (ended and vehicle.min_speed > 0.0):
+                    if metres - before >= 2.0 * stride_m / FINE and not (ended and vehicle.min_speed > 0.0):
                         longest = mark == len(settings.marks) and not ended
                         way = gear * metres
                         _wait(

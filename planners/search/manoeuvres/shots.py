@@ -85,7 +85,7 @@ def _shoot_alone(
     vehicle: Vehicle,
     scene: Scene,
 ) -> bool:
-    """Try words to a node without trailers."""
+    """Try words from node ``last`` of the tree out of the start to a node of the tree out of the goal."""
     c = drive.connection
     for k in range(c.states.shape[1]):
         c.states[0, k] = before.states[last, k]
@@ -122,7 +122,7 @@ def shoot_with_trailers(
     vehicle: Vehicle,
     scene: Scene,
 ) -> bool:
-    """Try words to a node, corrected so that the trailers stand as they do there."""
+    """Try words from the start to a node, corrected so that the trailers stand as they do there."""
     c = drive.connection
     x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
     there = (tree.states[node, 0], tree.states[node, 1], tree.states[node, 2])

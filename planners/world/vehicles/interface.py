@@ -4,7 +4,8 @@ The bodies here never run: ``by_vehicle`` takes the implementation for the kind 
 
 A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s). The two
 controls are constant during a step. A new kind of vehicle needs its settings in ``vehicle``, a file here, an
-entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is asked for (docs/architecture.md).
+entry in ``dynamics.KINDS``, its equations in ``slopes``, and a branch wherever the kind of a vehicle is asked
+for (docs/architecture.md).
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority r
 ROUNDING: Final = 1e-6  # of the largest lateral acceleration: planners keep off it, and states may pass it
 
 unseen(About)
-with_step: Callable[[Vehicle, float], Vehicle] = replacing("dt")  # only in kernels: with steps so long
+with_step: Callable[[Vehicle, float], Vehicle] = replacing(
+    "dt"
+)  # only in kernels: with steps of other length
 
 
 @by_vehicle

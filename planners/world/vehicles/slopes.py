@@ -25,18 +25,18 @@ Instant = tuple[float, float, float, float, float, float, float]  # speed; sine 
 
 @inlined
 def _pose_slope(
-    directions: tuple[float, ...], h: float, speeds: Three, by_speed: Three, by_turn: Three
+    directions: tuple[float, ...], h: float, speeds: Three, speed_slopes: Three, turn_slopes: Three
 ) -> Three:
     """How the pose after a step changes if speeds and turn rates do so at its beginning, middle and end."""
     sin_1, cos_1, sin_2, cos_2, sin_3, cos_3, sin_4, cos_4 = directions
-    turn_2 = 0.5 * h * by_turn[0]
-    turn_3 = 0.5 * h * by_turn[1]
-    turn_4 = h * by_turn[1]
-    x = by_speed[0] * cos_1 + 2.0 * by_speed[1] * (cos_2 + cos_3) + by_speed[2] * cos_4
-    y = by_speed[0] * sin_1 + 2.0 * by_speed[1] * (sin_2 + sin_3) + by_speed[2] * sin_4
+    turn_2 = 0.5 * h * turn_slopes[0]
+    turn_3 = 0.5 * h * turn_slopes[1]
+    turn_4 = h * turn_slopes[1]
+    x = speed_slopes[0] * cos_1 + 2.0 * speed_slopes[1] * (cos_2 + cos_3) + speed_slopes[2] * cos_4
+    y = speed_slopes[0] * sin_1 + 2.0 * speed_slopes[1] * (sin_2 + sin_3) + speed_slopes[2] * sin_4
     x -= 2.0 * speeds[1] * (sin_2 * turn_2 + sin_3 * turn_3) + speeds[2] * sin_4 * turn_4
     y += 2.0 * speeds[1] * (cos_2 * turn_2 + cos_3 * turn_3) + speeds[2] * cos_4 * turn_4
-    return h / 6.0 * x, h / 6.0 * y, h / 6.0 * (by_turn[0] + 4.0 * by_turn[1] + by_turn[2])
+    return h / 6.0 * x, h / 6.0 * y, h / 6.0 * (turn_slopes[0] + 4.0 * turn_slopes[1] + turn_slopes[2])
 
 
 @inlined
@@ -48,15 +48,19 @@ def _instant(speed: float, hitches: Three) -> Instant:
 
 
 @inlined
-def _rate_slope(at: Instant, lengths: Three, by_speed: float, by_turn: float, by_hitch: Three) -> Three:
+def _rate_slope(
+    at: Instant, lengths: Three, speed_slope: float, turn_slope: float, hitch_slopes: Three
+) -> Three:
     """How the rates of ``hitch_rates`` change if speed, turn rate and hitch angles do so."""
     speed, sin_1, cos_1, sin_2, cos_2, sin_3, cos_3 = at
-    along_1 = by_speed * cos_1 - speed * sin_1 * by_hitch[0]  # of the speed of the first trailer's axle
-    along_2 = along_1 * cos_2 - speed * cos_1 * sin_2 * by_hitch[1]
-    turn_1 = (by_speed * sin_1 + speed * cos_1 * by_hitch[0]) / lengths[0]
-    turn_2 = (along_1 * sin_2 + speed * cos_1 * cos_2 * by_hitch[1]) / lengths[1]
-    turn_3 = (along_2 * sin_3 + speed * cos_1 * cos_2 * cos_3 * by_hitch[2]) / lengths[2]
-    return by_turn - turn_1, turn_1 - turn_2, turn_2 - turn_3
+    along_1 = (
+        speed_slope * cos_1 - speed * sin_1 * hitch_slopes[0]
+    )  # of the speed of the first trailer's axle
+    along_2 = along_1 * cos_2 - speed * cos_1 * sin_2 * hitch_slopes[1]
+    turn_1 = (speed_slope * sin_1 + speed * cos_1 * hitch_slopes[0]) / lengths[0]
+    turn_2 = (along_1 * sin_2 + speed * cos_1 * cos_2 * hitch_slopes[1]) / lengths[1]
+    turn_3 = (along_2 * sin_3 + speed * cos_1 * cos_2 * cos_3 * hitch_slopes[2]) / lengths[2]
+    return turn_slope - turn_1, turn_1 - turn_2, turn_2 - turn_3
 
 
 @lean
@@ -64,19 +68,23 @@ def _hitch_slope(
     instants: tuple[Instant, Instant, Instant, Instant],
     lengths: Three,
     h: float,
-    by_speed: Three,
-    by_turn: Three,
-    by_hitch: Three,
+    speed_slopes: Three,
+    turn_slopes: Three,
+    hitch_slopes: Three,
 ) -> Three:
     """How the hitch angles after a step change if speeds, turn rates and the angles before it do so."""
-    k = _rate_slope(instants[0], lengths, by_speed[0], by_turn[0], by_hitch)
-    p = _rate_slope(instants[1], lengths, by_speed[1], by_turn[1], after_rates(by_hitch, 0.5 * h, k))
-    q = _rate_slope(instants[2], lengths, by_speed[1], by_turn[1], after_rates(by_hitch, 0.5 * h, p))
-    r = _rate_slope(instants[3], lengths, by_speed[2], by_turn[2], after_rates(by_hitch, h, q))
+    k = _rate_slope(instants[0], lengths, speed_slopes[0], turn_slopes[0], hitch_slopes)
+    p = _rate_slope(
+        instants[1], lengths, speed_slopes[1], turn_slopes[1], after_rates(hitch_slopes, 0.5 * h, k)
+    )
+    q = _rate_slope(
+        instants[2], lengths, speed_slopes[1], turn_slopes[1], after_rates(hitch_slopes, 0.5 * h, p)
+    )
+    r = _rate_slope(instants[3], lengths, speed_slopes[2], turn_slopes[2], after_rates(hitch_slopes, h, q))
     return (
-        by_hitch[0] + h / 6.0 * (k[0] + 2.0 * p[0] + 2.0 * q[0] + r[0]),
-        by_hitch[1] + h / 6.0 * (k[1] + 2.0 * p[1] + 2.0 * q[1] + r[1]),
-        by_hitch[2] + h / 6.0 * (k[2] + 2.0 * p[2] + 2.0 * q[2] + r[2]),
+        hitch_slopes[0] + h / 6.0 * (k[0] + 2.0 * p[0] + 2.0 * q[0] + r[0]),
+        hitch_slopes[1] + h / 6.0 * (k[1] + 2.0 * p[1] + 2.0 * q[1] + r[1]),
+        hitch_slopes[2] + h / 6.0 * (k[2] + 2.0 * p[2] + 2.0 * q[2] + r[2]),
     )
 
 
@@ -105,23 +113,23 @@ def _fill_hitch_slopes(
         _instant(speeds[1], again),
         _instant(speeds[2], after_rates(hitches, h, q)),
     )
-    none = (0.0, 0.0, 0.0)
+    unchanged = (0.0, 0.0, 0.0)
     trailers = len(state) - 5
     for number in range(4):
-        by_speed, by_turn = slopes[number]
-        slope = _hitch_slope(instants, lengths, h, by_speed, by_turn, none)
+        speed_slopes, turn_slopes = slopes[number]
+        slope = _hitch_slope(instants, lengths, h, speed_slopes, turn_slopes, unchanged)
         for t in range(trailers):
             if number < 2:
                 by_state[5 + t, 3 + number] = slope[t]
             else:
                 by_control[5 + t, number - 2] = slope[t]
     for number in range(trailers):
-        by_hitch = (
+        hitch_slopes = (
             1.0 if number == 0 else 0.0,
             1.0 if number == 1 else 0.0,
             1.0 if number == 2 else 0.0,
         )
-        slope = _hitch_slope(instants, lengths, h, none, none, by_hitch)
+        slope = _hitch_slope(instants, lengths, h, unchanged, unchanged, hitch_slopes)
         for t in range(trailers):
             by_state[5 + t, 5 + number] = slope[t]
 
@@ -166,11 +174,13 @@ def differentiate_step(
             by_control[r, c] = 0.0
     by_state[0, 2] = state[1] - after[1]  # the step turns with the heading
     by_state[1, 2] = after[0] - state[0]
-    for r in range(3):
-        by_state[r, 3] = _pose_slope(directions, h, speeds, slopes[0][0], slopes[0][1])[r]
-        by_state[r, 4] = _pose_slope(directions, h, speeds, slopes[1][0], slopes[1][1])[r]
-        by_control[r, 0] = _pose_slope(directions, h, speeds, slopes[2][0], slopes[2][1])[r]
-        by_control[r, 1] = _pose_slope(directions, h, speeds, slopes[3][0], slopes[3][1])[r]
+    for number in range(4):
+        slope = _pose_slope(directions, h, speeds, slopes[number][0], slopes[number][1])
+        for r in range(3):
+            if number < 2:
+                by_state[r, 3 + number] = slope[r]
+            else:
+                by_control[r, number - 2] = slope[r]
     by_control[3, 0] = h
     by_control[4, 1] = h
     if len(state) > 5:  # decided when compiling
