@@ -103,7 +103,9 @@ def main() -> None:
     asked = parser.parse_args()
     console = Console(width=190)
     for what in asked.asked:
-        table = Table(*HEADINGS, box=None, show_header=what == asked.asked[0], expand=True)
+        table = Table(box=None, show_header=what == asked.asked[0])
+        for heading in HEADINGS:
+            table.add_column(heading, width=28 if heading == "asked" else 17, no_wrap=True)
         rows = measured(what, asked)
         planning, driving, wrong = np.moveaxis(rows, 2, 0)
         solved = np.isfinite(driving)
