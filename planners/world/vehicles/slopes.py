@@ -53,9 +53,8 @@ def _rate_slope(
 ) -> Three:
     """How the rates of ``hitch_rates`` change if speed, turn rate and hitch angles do so."""
     speed, sin_1, cos_1, sin_2, cos_2, sin_3, cos_3 = at
-    along_1 = (
-        speed_slope * cos_1 - speed * sin_1 * hitch_slopes[0]
-    )  # of the speed of the first trailer's axle
+    # of the speeds of the axles of the first two trailers
+    along_1 = speed_slope * cos_1 - speed * sin_1 * hitch_slopes[0]
     along_2 = along_1 * cos_2 - speed * cos_1 * sin_2 * hitch_slopes[1]
     turn_1 = (speed_slope * sin_1 + speed * cos_1 * hitch_slopes[0]) / lengths[0]
     turn_2 = (along_1 * sin_2 + speed * cos_1 * cos_2 * hitch_slopes[1]) / lengths[1]
