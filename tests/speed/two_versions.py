@@ -101,11 +101,11 @@ def main() -> None:
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--memory", type=lambda path: Path(path).resolve())
     asked = parser.parse_args()
-    console = Console(width=190)
+    console = Console(width=210)
     for what in asked.asked:
         table = Table(box=None, show_header=what == asked.asked[0])
         for heading in HEADINGS:
-            table.add_column(heading, width=28 if heading == "asked" else 17, no_wrap=True)
+            table.add_column(heading, width=28 if heading == "asked" else 20, no_wrap=True)
         rows = measured(what, asked)
         planning, driving, wrong = np.moveaxis(rows, 2, 0)
         solved = np.isfinite(driving)
