@@ -9,11 +9,7 @@ from planners.optimisation.arrival_error import aim_near, bend_of_error
 from planners.optimisation.gains import effort
 from planners.optimisation.gaps import Barrier
 from planners.optimisation.interior.buffers import LIMITED, Interior, limits_of, value_of
-from planners.optimisation.local_model import (
-    Model,
-    differentiate_nearness,
-    nearness_cost,
-)
+from planners.optimisation.local_model import Model, differentiate_nearness, nearness_cost
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, MOST_TURN, RADIUS

@@ -88,14 +88,24 @@ def _runge_kutta(start: float, h: float, k1: float, k2: float, k3: float, k4: fl
 
 
 @inlined
-def _hitches_after(h: float, speeds: Three, turns: Three, state: State, vehicle: CarWithTrailers) -> Three:
-    """The hitch angles ``h`` seconds later; speeds and turn rates of the car at beginning, middle and end."""
-    lengths = hitch_lengths(vehicle)
-    hitches = hitches_of(state)
+def hitch_stages(
+    h: float, speeds: Three, turns: Three, hitches: Three, lengths: Three
+) -> tuple[Three, Three, Three, Three]:
+    """The rates of ``hitch_rates`` at the four points of a Runge-Kutta step of ``h`` seconds.
+
+    Speeds and turn rates of the car are those at beginning, middle and end.
+    """
     k = hitch_rates(speeds[0], turns[0], hitches, lengths)
     p = hitch_rates(speeds[1], turns[1], after_rates(hitches, 0.5 * h, k), lengths)
     q = hitch_rates(speeds[1], turns[1], after_rates(hitches, 0.5 * h, p), lengths)
-    r = hitch_rates(speeds[2], turns[2], after_rates(hitches, h, q), lengths)
+    return k, p, q, hitch_rates(speeds[2], turns[2], after_rates(hitches, h, q), lengths)
+
+
+@inlined
+def _hitches_after(h: float, speeds: Three, turns: Three, state: State, vehicle: CarWithTrailers) -> Three:
+    """The hitch angles ``h`` seconds later; speeds and turn rates of the car at beginning, middle and end."""
+    hitches = hitches_of(state)
+    k, p, q, r = hitch_stages(h, speeds, turns, hitches, hitch_lengths(vehicle))
     return (
         _runge_kutta(hitches[0], h, k[0], p[0], q[0], r[0]),
         _runge_kutta(hitches[1], h, k[1], p[1], q[1], r[1]),

@@ -25,9 +25,8 @@ SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority r
 ROUNDING: Final = 1e-6  # of the largest lateral acceleration: planners keep off it, and states may pass it
 
 unseen(About)
-with_step: Callable[[Vehicle, float], Vehicle] = replacing(
-    "dt"
-)  # only in kernels: with steps of other length
+# the vehicle with another length of step; only in kernels
+with_step: Callable[[Vehicle, float], Vehicle] = replacing("dt")
 
 
 @by_vehicle

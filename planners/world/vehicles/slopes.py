@@ -14,7 +14,7 @@ from planners.world.vehicles.car_with_trailers import (
     Three,
     after_rates,
     hitch_lengths,
-    hitch_rates,
+    hitch_stages,
     hitches_of,
 )
 from planners.world.vehicles.dynamics import State, step, turn_rate
@@ -101,15 +101,11 @@ def _fill_hitch_slopes(
     h = vehicle.dt
     lengths = hitch_lengths(vehicle)
     hitches = hitches_of(state)
-    k = hitch_rates(speeds[0], turns[0], hitches, lengths)
-    middle = after_rates(hitches, 0.5 * h, k)
-    p = hitch_rates(speeds[1], turns[1], middle, lengths)
-    again = after_rates(hitches, 0.5 * h, p)
-    q = hitch_rates(speeds[1], turns[1], again, lengths)
+    k, p, q, _ = hitch_stages(h, speeds, turns, hitches, lengths)
     instants = (
         _instant(speeds[0], hitches),
-        _instant(speeds[1], middle),
-        _instant(speeds[1], again),
+        _instant(speeds[1], after_rates(hitches, 0.5 * h, k)),
+        _instant(speeds[1], after_rates(hitches, 0.5 * h, p)),
         _instant(speeds[2], after_rates(hitches, h, q)),
     )
     unchanged = (0.0, 0.0, 0.0)
