@@ -9,14 +9,14 @@ from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
 from planners.world.trigonometry import sincos
-from planners.world.vehicles.dynamics import State, step, store, top_speed, turn_in
+from planners.world.vehicles.dynamics import State, step, store, top_speed, trailing, turn_in
 from planners.world.vehicles.vehicle import Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
 LEAST: Final = 0.001  # of it: the stride of a vehicle that hardly moves in a step
 COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
 FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
-# where a part of an arc leads from the origin: pose, speed, fifth variable
+# a step along an arc: where it leads from the origin, and the speed (m/s) and fifth variable on it
 Leap = tuple[float, float, float, float, float]
 
 
@@ -47,37 +47,34 @@ class Stride(NamedTuple):
     """A stride of an arc: from one look at obstacles to the next."""
 
     metres: float
-    bend: float
-    speed: float  # m/s with which it is driven in a step, negative backwards
     whole: Leap
     fine: Leap  # ``FINE`` of them
 
 
 @inlined
-def _leap_of(state: State, speed: float, bend: float, vehicle: Vehicle) -> Leap:
+def leap_of(state: State, speed: float, bend: float, vehicle: Vehicle) -> Leap:
+    """Where a step at a constant speed (m/s) and bend leads; any ``state`` will do."""
     origin = at_pace((0.0, 0.0, 0.0, *state[3:]), speed, bend, vehicle)
     after = step(origin, 0.0, 0.0, vehicle)
-    return after[0], after[1], after[2], after[3], after[4]
+    return after[0], after[1], after[2], origin[3], origin[4]
 
 
 @inlined
 def stride_in(state: State, gear: float, bend: float, metres: float, vehicle: Vehicle) -> Stride:
     """The stride of so many ``metres``, at most ``stride_of``, in a gear (1 or -1); any ``state`` will do."""
     speed = gear * metres / vehicle.dt
-    whole = _leap_of(state, speed, bend, vehicle)
-    return Stride(metres, bend, speed, whole, _leap_of(state, speed / FINE, bend, vehicle))
+    whole = leap_of(state, speed, bend, vehicle)
+    return Stride(metres, whole, leap_of(state, speed / FINE, bend, vehicle))
 
 
 @inlined
-def _leapt(state: State, leap: Leap, speed: float, bend: float, vehicle: Vehicle) -> State:
-    """The state after a leap. With trailers, of which a leap does not tell, the step is simulated."""
-    if len(state) > 5:  # decided when compiling
-        return step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
-    else:
-        sin, cos = sincos(state[2])
-        x = state[0] + cos * leap[0] - sin * leap[1]
-        y = state[1] + sin * leap[0] + cos * leap[1]
-        return x, y, state[2] + leap[2], leap[3], leap[4]
+def leapt(state: State, leap: Leap, vehicle: Vehicle) -> State:
+    """The state after a leap. Only the trailers are simulated: all else turns and moves with the state."""
+    sin, cos = sincos(state[2])
+    x = state[0] + cos * leap[0] - sin * leap[1]
+    y = state[1] + sin * leap[0] + cos * leap[1]
+    after = (x, y, state[2] + leap[2], leap[3], leap[4], *state[5:])
+    return trailing(after, leap[2] / vehicle.dt, vehicle)
 
 
 @inlined
@@ -95,12 +92,12 @@ def stride_along(state: State, stride: Stride, vehicle: Vehicle, scene: Scene) -
     Returns:
         The last free state, how many metres were free, and how often obstacles were looked at.
     """
-    metres, bend = stride.metres, stride.bend
-    after = _leapt(state, stride.whole, stride.speed, bend, vehicle)
+    metres = stride.metres
+    after = leapt(state, stride.whole, vehicle)
     if state_is_free(after, vehicle, scene):
         return after, metres, 1
     for k in range(FINE):
-        after = _leapt(state, stride.fine, stride.speed / FINE, bend, vehicle)
+        after = leapt(state, stride.fine, vehicle)
         if not state_is_free(after, vehicle, scene):
             return state, k * metres / FINE, k + 2
         state = after

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import COARSE, at_pace, stride_along, stride_in, stride_of
+from planners.search.manoeuvres.arcs import COARSE, leap_of, leapt, stride_along, stride_in, stride_of
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
@@ -22,7 +22,7 @@ from planners.world.vehicles.dynamics import (
     State,
     bend_with,
     load,
-    step,
+    numbers_of,
     store,
     tightest_bend,
     turning_speed,
@@ -48,7 +48,10 @@ class Join(NamedTuple):
 
     arcs: Floats  # [3, MOST_ARCS] gear (1 or -1), bend, length in metres
     ends: Floats  # [3, S] where the arcs before the meeting lead; where all should; where those after begin
+    ways: Floats  # [MOST_ARCS, S] where each arc leads: those before the meeting on, those after it back
     effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on what is missing: x, y, heading, hitches
+    bent: Floats  # [1, S] where an arc begins, with one hitch bent a little
+    carried: Floats  # [2, 3, 3] what hitches at the end of an arc do at the meeting
     squares: Floats  # [6, 7] the equations of a correction
     free: Floats  # [2 MOST_ARCS] 0 for what the last round would have moved beyond its limit, else 1
     chain: Indices  # [MOST_CHAIN] nodes between a node of a tree and its root
@@ -61,7 +64,10 @@ def allocate_join(state_size: int) -> Join:
     return Join(
         np.zeros((3, MOST_ARCS)),
         np.zeros((3, state_size)),
+        np.zeros((MOST_ARCS, state_size)),
         np.zeros((6, 2 * MOST_ARCS)),
+        np.zeros((1, state_size)),
+        np.zeros((2, 3, 3)),
         np.zeros((6, 7)),
         np.zeros(2 * MOST_ARCS),
         np.zeros(MOST_CHAIN, np.int64),
@@ -77,31 +83,94 @@ def _along(state: State, gear: float, bend: float, metres: float, stride: float,
     if count == 0:
         return state
     speed = gear * metres / (count * vehicle.dt)
+    leap = leap_of(state, speed, bend, vehicle)
     for _ in range(count):
-        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+        state = leapt(state, leap, vehicle)
     return state
 
 
 @inlined
-def _along_number(state: State, join: Join, k: int, sign: float, changed: int, vehicle: Vehicle) -> State:
-    """The end of arc number ``k``, driven on (``sign`` 1) or back (-1); ``changed`` as in ``_ends``."""
-    bend = join.arcs[1, k] + (NUDGE if changed == 2 * k else 0.0)
-    metres = join.arcs[2, k] + (NUDGE if changed == 2 * k + 1 else 0.0)
+def _beginning(start: Floats, join: Join, k: int, vehicle: Vehicle) -> State:
+    """Where arc number ``k`` begins: one after the meeting at its end, as it is followed back."""
+    if k < join.counts[BEFORE]:
+        return load(start, 0, vehicle) if k == 0 else load(join.ways, k - 1, vehicle)
+    return load(join.ends, 1, vehicle) if k == join.counts[ARCS] - 1 else load(join.ways, k + 1, vehicle)
+
+
+@inlined
+def _led(state: State, join: Join, k: int, bend: float, metres: float, vehicle: Vehicle) -> State:
+    """Where arc number ``k`` leads from a state, with so much more bend and length."""
     gear = join.arcs[0, k]
-    return _along(state, sign * gear, bend, metres, stride_of(gear, vehicle), vehicle)
+    sign = 1.0 if k < join.counts[BEFORE] else -1.0
+    stride = stride_of(gear, vehicle)
+    return _along(state, sign * gear, join.arcs[1, k] + bend, join.arcs[2, k] + metres, stride, vehicle)
 
 
 @lean
-def _ends(start: Floats, join: Join, changed: int, vehicle: Vehicle) -> None:
-    """Find both ends at the meeting. The bend or length of number ``changed`` is nudged, none if negative."""
-    state = load(start, 0, vehicle)
-    for k in range(join.counts[BEFORE]):
-        state = _along_number(state, join, k, 1.0, changed, vehicle)
-    store(join.ends, 0, state)
-    state = load(join.ends, 1, vehicle)
-    for k in range(join.counts[ARCS] - 1, join.counts[BEFORE] - 1, -1):
-        state = _along_number(state, join, k, -1.0, changed, vehicle)
-    store(join.ends, 2, state)
+def follow(start: Floats, join: Join, vehicle: Vehicle) -> None:
+    """Find where each arc leads, and so both ends at the meeting."""
+    before, arcs = join.counts[BEFORE], join.counts[ARCS]
+    for i in range(arcs):
+        k = i if i < before else arcs - 1 - (i - before)
+        store(join.ways, k, _led(_beginning(start, join, k, vehicle), join, k, 0.0, 0.0, vehicle))
+    store(join.ends, 0, load(join.ways, before - 1, vehicle) if before > 0 else load(start, 0, vehicle))
+    store(join.ends, 2, load(join.ways, before, vehicle) if before < arcs else load(join.ends, 1, vehicle))
+
+
+@inlined
+def _carry(join: Join, k: int, column: int, after: State) -> None:
+    """Note in a column what it does at the meeting that arc ``k`` leads to ``after``: without the hitches."""
+    end = 0 if k < join.counts[BEFORE] else 2
+    turned = after[2] - join.ways[k, 2]
+    join.effects[0, column] = after[0] - join.ways[k, 0] - turned * (join.ends[end, 1] - join.ways[k, 1])
+    join.effects[1, column] = after[1] - join.ways[k, 1] + turned * (join.ends[end, 0] - join.ways[k, 0])
+    join.effects[2, column] = turned
+
+
+@inlined
+def _carried_hitch(join: Join, k: int, row: int, after: State, hitches: int) -> float:
+    """What it does to hitch ``row`` at the meeting that arc ``k`` leads to ``after``."""
+    total = 0.0
+    for j in range(hitches):
+        total += join.carried[0, row, j] * (after[5 + j] - join.ways[k, 5 + j])
+    return total
+
+
+@lean
+def find_effects(start: Floats, join: Join, vehicle: Vehicle) -> None:
+    """Find what more bend and length of each arc do at the meeting, after ``follow``.
+
+    Each arc is nudged alone: what follows it turns and moves as a whole, but for the hitches, of which is
+    carried on from arc to arc what they do at the meeting.
+    """
+    before, arcs = join.counts[BEFORE], join.counts[ARCS]
+    hitches = numbers_of(start, vehicle) - 5
+    for i in range(arcs):
+        k = before - 1 - i if i < before else i  # from the meeting on, to either side
+        if i in (0, before):
+            for row in range(hitches):
+                for j in range(hitches):
+                    join.carried[0, row, j] = 1.0 if row == j else 0.0
+        sign = 1.0 if k < before else -1.0
+        begin = _beginning(start, join, k, vehicle)
+        for which in range(2):
+            bend, metres = (NUDGE, 0.0) if which == 0 else (0.0, NUDGE)
+            after = _led(begin, join, k, bend, metres, vehicle)
+            column = 2 * k + which
+            _carry(join, k, column, after)
+            for row in range(hitches):
+                join.effects[3 + row, column] = _carried_hitch(join, k, row, after, hitches)
+            for row in range(3 + hitches):
+                join.effects[row, column] *= sign / NUDGE
+        for j in range(hitches):
+            store(join.bent, 0, begin)
+            join.bent[0, 5 + j] += NUDGE
+            after = _led(load(join.bent, 0, vehicle), join, k, 0.0, 0.0, vehicle)
+            for row in range(hitches):
+                join.carried[1, row, j] = _carried_hitch(join, k, row, after, hitches) / NUDGE
+        for row in range(hitches):
+            for j in range(hitches):
+                join.carried[0, row, j] = join.carried[1, row, j]
 
 
 @inlined
@@ -147,7 +216,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
         join.free[column] = 1.0
     limit = tightest_bend(turning_speed(vehicle), vehicle)
     size = vehicle.front + vehicle.rear
-    _ends(start, join, -1, vehicle)
+    follow(start, join, vehicle)
     for _ in range(ROUNDS):
         worst = _worst(join)
         if worst < EXACT:
@@ -156,12 +225,11 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
             return False
         for row in range(rows):
             join.squares[row, rows] = _off(join, row)
+        find_effects(start, join, vehicle)
         for column in range(columns):
             weight = BEND_SHARE * limit if column % 2 == 0 else LENGTH_SHARE * size
-            _ends(start, join, column, vehicle)
             for row in range(rows):
-                effect = join.squares[row, rows] - _off(join, row)
-                join.effects[row, column] = join.free[column] * weight * effect / NUDGE
+                join.effects[row, column] *= join.free[column] * weight
         for i in range(rows):
             for j in range(rows):
                 total = DAMPING if i == j else 0.0
@@ -188,7 +256,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
                 join.arcs[2, arc] = max(metres, 0.0)
                 fits = metres >= 0.0
             join.free[column] = 1.0 if fits else 0.0
-        _ends(start, join, -1, vehicle)
+        follow(start, join, vehicle)
     return False
 
 
@@ -223,7 +291,7 @@ def take_word(join: Join, word: Floats, radius: float, vehicle: Vehicle) -> None
 @lean
 def trailers_are_off(start: Floats, join: Join, most: float, vehicle: Vehicle) -> bool:
     """Whether the arcs leave a trailer more than ``most`` radians from where it should be."""
-    _ends(start, join, -1, vehicle)
+    follow(start, join, vehicle)
     for row in range(3, join.ends.shape[1] - 2):  # noqa: SIM110 Numba has no generators for any()
         if not abs(_off(join, row)) <= most:
             return True

@@ -17,7 +17,7 @@ from planners.search.manoeuvres.levels import FINE, LEVELS, suited
 from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
-from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
+from planners.search.manoeuvres.outward import TURN, begin_outward, grow_trees, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
@@ -50,7 +50,8 @@ PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that lo
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
-SLICE: Final = 64  # expansions between two looks at the clock
+TURNS: Final = 32  # of both trees between two looks at the clock ...
+AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
@@ -223,9 +224,12 @@ class Manoeuvring:
         """
         if self._loops(until):
             return True
-        while self.expansions < end and not self.is_over and working_clock() < until:
+        while self.expansions < end and not self.is_over and (left := until - working_clock()) > 0.0:
             level_ends = self._expansions - self._spent
-            found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
+            turns = TURNS if left > AMPLE_S else 1
+            if self._may_mend:
+                turns = min(turns, max(math.ceil((self._mend_at - self.expansions) / TURN), 1))
+            found, used = self._grow(min(end - self.expansions, level_ends, turns * TURN))
             if found:
                 self._is_mended = self._is_mended and bool(self.kept)
                 return True
@@ -302,20 +306,23 @@ class Manoeuvring:
 
         Without trailers the tree out of the start grows, too, if only that is tight, or later.
         """
+        needs_both = not self.meets and not self.kept
         level = suited(self._level, self._vehicle)
-        settings = self._goal, self._drive, level
-        driven = self._vehicle, self._scene
-        found, used, both = False, 0, self._grows_both
-        if both:
-            found, used = grow_outward(
-                self._other, self._tree, most // 2, self._known_there, *settings, self._leaving, *driven
-            )
-        self._ended = both and not self.meets and used < most // 2 and not self.kept
-        if not found:
-            found, more = grow_outward(
-                self._tree, self._other, most - used, self._known, *settings, self._outgoing, *driven
-            )
-            used += more
+        known = self._known, self._known_there
+        vehicles = self._outgoing, self._leaving, self._vehicle
+        found, used, self._ended = grow_trees(
+            self._tree,
+            self._other,
+            most,
+            self._grows_both,
+            needs_both,
+            *known,
+            self._goal,
+            self._drive,
+            level,
+            *vehicles,
+            self._scene,
+        )
         self.expansions += used
         self._spent += used
         return found, used

@@ -40,6 +40,7 @@ from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
+TURN: Final = 64  # expansions of both trees before it is the first one's turn again
 
 
 class Outward(NamedTuple):
@@ -288,3 +289,65 @@ def grow_outward(
             return True, expansions
         open_node(tree, other, node, longest == 1, known, settings, outgoing, vehicle, scene)
     return False, expansions
+
+
+@lean
+def grow_trees(
+    tree: PoseTree,
+    other: PoseTree,
+    most: int,
+    both: bool,
+    needs_both: bool,
+    known: FromStart,
+    known_there: FromStart,
+    goal: Floats,
+    drive: Drive,
+    settings: Outward,
+    outgoing: Vehicle,
+    leaving: Vehicle,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> tuple[bool, int, bool]:
+    """Grow the tree out of the goal, and in turn with it the ``other`` out of the start if ``both`` grow.
+
+    It is one call, because to hand all of this over from Python takes as long as some expansions.
+
+    Args:
+        tree: out of the goal; ``known`` and ``outgoing`` are for it.
+        other: out of the start; ``known_there`` and ``leaving`` are for it.
+        most: expansions of both.
+        both: whether both grow.
+        needs_both: whether to end where the other cannot grow.
+        known: what leads to the start.
+        known_there: what leads to the goal.
+        goal: that of ``goal_of``.
+        drive: buffers.
+        settings: how they grow.
+        outgoing: the vehicle as it drives out of the goal.
+        leaving: the vehicle as it drives out of the start.
+        vehicle: the vehicle itself.
+        scene: what must not be met.
+
+    Returns:
+        Whether ``drive`` leads to the goal now, how many expansions there were, and whether it ended because
+        the other tree could not grow.
+    """
+    found = ended = False
+    used = 0
+    while used < most and not found and not ended:
+        share = min(TURN, most - used)
+        began = used
+        if both:
+            found, used_there = grow_outward(
+                other, tree, share // 2, known_there, goal, drive, settings, leaving, vehicle, scene
+            )
+            used += used_there
+            ended = needs_both and used_there < share // 2
+        if not found:
+            found, used_here = grow_outward(
+                tree, other, began + share - used, known, goal, drive, settings, outgoing, vehicle, scene
+            )
+            used += used_here
+        if used == began:
+            break
+    return found, used, ended

@@ -87,6 +87,11 @@ def _step(state: State, first: float, second: float, vehicle: Car) -> State:
     )
 
 
+@implements(interface.trailing, Car)
+def _trailing(state: State, turn: float, vehicle: Car) -> State:
+    return state
+
+
 @implements(interface.control_limits, Car, CarWithTrailers)
 def _control_limits(vehicle: CarLike) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_steering_rate

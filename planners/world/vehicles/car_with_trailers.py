@@ -113,6 +113,17 @@ def _hitches_after(h: float, speeds: Three, turns: Three, state: State, vehicle:
     )
 
 
+@inlined
+def _as_many(hitches: Three, state: State) -> tuple[float, ...]:
+    """The hitch angles of the trailers that a state has."""
+    if len(state) == 6:
+        return (hitches[0],)
+    elif len(state) == 7:
+        return hitches[:2]
+    else:
+        return hitches
+
+
 @implements(interface.step, CarWithTrailers)
 def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -> State:
     h = vehicle.dt
@@ -125,15 +136,17 @@ def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -
     middle_speed = speed + 0.5 * h * first
     turns = turn_rates(speed, steering, first, second, vehicle)
     x, y, heading = drive(state[0], state[1], state[2], speed, end_speed, turns, h)
-    hitch_1, hitch_2, hitch_3 = _hitches_after(h, (speed, middle_speed, end_speed), turns, state, vehicle)
+    hitches = _hitches_after(h, (speed, middle_speed, end_speed), turns, state, vehicle)
     end_speed = min(max(end_speed, vehicle.min_speed), vehicle.max_speed)
     end_steering = min(max(end_steering, -vehicle.max_steering), vehicle.max_steering)
-    if len(state) == 6:
-        return x, y, heading, end_speed, end_steering, hitch_1
-    elif len(state) == 7:
-        return x, y, heading, end_speed, end_steering, hitch_1, hitch_2
-    else:
-        return x, y, heading, end_speed, end_steering, hitch_1, hitch_2, hitch_3
+    return (x, y, heading, end_speed, end_steering, *_as_many(hitches, state))
+
+
+@implements(interface.trailing, CarWithTrailers)
+def _trailing(state: State, turn: float, vehicle: CarWithTrailers) -> State:
+    speeds = (state[3], state[3], state[3])
+    hitches = _hitches_after(vehicle.dt, speeds, (turn, turn, turn), state, vehicle)
+    return (*state[:5], *_as_many(hitches, state))
 
 
 @implements(interface.is_folded, CarWithTrailers)

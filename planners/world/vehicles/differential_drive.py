@@ -45,6 +45,11 @@ def _step(state: State, first: float, second: float, vehicle: DifferentialDrive)
     )
 
 
+@implements(interface.trailing, DifferentialDrive)
+def _trailing(state: State, turn: float, vehicle: DifferentialDrive) -> State:
+    return state
+
+
 @implements(interface.control_limits, DifferentialDrive)
 def _control_limits(vehicle: DifferentialDrive) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_turn_acceleration

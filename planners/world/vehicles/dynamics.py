@@ -25,6 +25,7 @@ from planners.world.vehicles.interface import store as store
 from planners.world.vehicles.interface import swept_bodies as swept_bodies
 from planners.world.vehicles.interface import tightest_bend as tightest_bend
 from planners.world.vehicles.interface import top_speed as top_speed
+from planners.world.vehicles.interface import trailing as trailing
 from planners.world.vehicles.interface import turn_error as turn_error
 from planners.world.vehicles.interface import turn_in as turn_in
 from planners.world.vehicles.interface import turn_limit as turn_limit

@@ -55,6 +55,15 @@ def step(state: State, first: float, second: float, vehicle: Vehicle) -> State:
 
 
 @by_vehicle
+def trailing(state: State, turn: float, vehicle: Vehicle) -> State:
+    """The state with its trailers where they are after a step at its speed and a turn rate (rad/s).
+
+    ``state`` holds the pose after the step, and the hitch angles before it.
+    """
+    raise NotImplementedError
+
+
+@by_vehicle
 def control_limits(vehicle: Vehicle) -> tuple[float, float]:
     """The largest absolute value of each control."""
     raise NotImplementedError

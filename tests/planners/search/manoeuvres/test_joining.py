@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from planners.search.connection.words import MOST_WORDS, PARTS, list_words
-from planners.search.manoeuvres.joining import ARCS, BEFORE, Join, allocate_join, close, take_word
+from planners.search.manoeuvres.arcs import at_pace, leap_of, leapt
+from planners.search.manoeuvres.joining import (
+    ARCS,
+    BEFORE,
+    Join,
+    allocate_join,
+    close,
+    find_effects,
+    follow,
+    take_word,
+)
 from planners.world.arrays import Floats
-from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR_1_TRAILER, CarWithTrailers, state_size
+from planners.world.vehicles.dynamics import simulate, step
+from planners.world.vehicles.vehicle import (
+    CAR_1_TRAILER,
+    CAR_2_TRAILERS,
+    VEHICLES,
+    CarWithTrailers,
+    Vehicle,
+    state_size,
+)
 
 RADIUS = 5.0
 
@@ -58,6 +76,49 @@ def test_arcs_close_a_gap_where_they_meet_and_back_on_from_there() -> None:
     there = driven(start[0], join, vehicle)
     back = driven(join.ends[1], after, vehicle)
     assert np.allclose(there[[0, 1, 2, 5]], back[[0, 1, 2, 5]], atol=1e-3)
+
+
+@pytest.mark.parametrize("vehicle", [CAR_1_TRAILER, CAR_2_TRAILERS], ids=["one trailer", "two"])
+@pytest.mark.parametrize("before", [0, 3, 6])
+def test_what_arcs_do_at_the_meeting_is_what_driving_all_of_them_again_shows(
+    vehicle: CarWithTrailers, before: int
+) -> None:
+    join = allocate_join(state_size(vehicle))
+    start = np.zeros((1, state_size(vehicle)))
+    start[0, [0, 1, 2, 5]] = 3.0, -1.0, 0.4, 0.1
+    join.arcs[:, :6] = [[1, 1, -1, -1, 1, -1], [0.1, 0.2, 0.1, -0.1, 0.1, 0.0], [2, 5, 1, 3, 2, 1]]
+    join.counts[[ARCS, BEFORE]] = 6, before
+    join.ends[1] = 7.0, 2.0, 1.0, 0.0, 0.0, *np.linspace(-0.2, 0.1, state_size(vehicle) - 5)
+    parts = [0, 1, 2, *range(5, state_size(vehicle))]
+
+    def met() -> Floats:
+        follow(start, join, vehicle)
+        return np.asarray(join.ends[0, parts] - join.ends[2, parts])
+
+    met()
+    find_effects(start, join, vehicle)
+    effects = join.effects[: len(parts)].copy()
+    for arc in range(6):
+        for which, row in enumerate((1, 2)):
+            moved = []
+            for change in (1e-4, -2e-4):
+                join.arcs[row, arc] += change
+                moved.append(met())
+            join.arcs[row, arc] += 1e-4
+            assert np.allclose(effects[:, 2 * arc + which], (moved[0] - moved[1]) / 2e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_leaps_lead_where_steps_lead(name: str) -> None:
+    vehicle: Vehicle = VEHICLES[name]
+    state = (1.0, 2.0, 0.3, 0.0, 0.0, *np.linspace(0.2, -0.1, state_size(vehicle) - 5).tolist())
+    for speed, bend in ((2.0, 0.3), (-0.8, -0.2), (3.0, 0.0)):
+        leapt_to, stepped_to = state, state
+        leap = leap_of(state, speed, bend, vehicle)
+        for _ in range(20):
+            leapt_to = leapt(leapt_to, leap, vehicle)
+            stepped_to = step(at_pace(stepped_to, speed, bend, vehicle), 0.0, 0.0, vehicle)
+        assert np.allclose(leapt_to, stepped_to, atol=1e-12)
 
 
 def driven(state: Floats, join: Join, vehicle: CarWithTrailers) -> Floats:

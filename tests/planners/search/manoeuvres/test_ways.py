@@ -13,7 +13,7 @@ from planners.optimisation.polish import polish_quickest
 from planners.search import lattice
 from planners.search import search_and_polish as searching
 from planners.search.lattice import LatticeSettings
-from planners.search.manoeuvres import manoeuvring
+from planners.search.manoeuvres import manoeuvring, outward
 from planners.search.manoeuvres.endings import endings_of
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Outcome
@@ -228,6 +228,6 @@ def test_beside_a_drive_a_search_goes_on_for_as_long_as_a_quicker_one_is_worth()
         assert alone.plan is not None
         for below_s in (2.0, 6.0, alone.plan.duration_s):
             found, _ = search_and_polish("lattice", query, 0, below_s=below_s)
-            assert found.expansions <= manoeuvring.PER_SQUARE_SECOND * below_s**2 + manoeuvring.SLICE
+            assert found.expansions <= manoeuvring.PER_SQUARE_SECOND * below_s**2 + outward.TURN
             least += found.expansions < alone.expansions
     assert least > 6
