@@ -79,6 +79,7 @@ def of_small_run(small_runs: SmallRuns, tmp_path: Path) -> tuple[Path, list[str]
     return data, [*small_run.OPTIONS, "--data", str(data), "--workers", "1"]
 
 
+@pytest.mark.slow  # a server and a worker, as for the run
 @pytest.mark.timeout(600)
 def test_a_failing_stage_tells_no_secret(of_small_run: tuple[Path, list[str]], tmp_path: Path) -> None:
     data, options = of_small_run
