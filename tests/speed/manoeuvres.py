@@ -1,16 +1,17 @@
 """How fast manoeuvres are planned from scratch, cold, on one core, and how long the drives take.
 
 ``python -m tests.speed manoeuvres [--families …] [--difficulties …] [--vehicles …] [--questions 100] [--seed
-79] [--planners …] [--optimise] [--ompl] [--given]`` draws questions of the families and prints for each
+79] [--planners …] [--optimise] [--others …] [--given]`` draws questions of the families and prints for each
 family and planner the solved share, planning times (failures included), driving times and changes of gear of
 what all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
 Bench-MR instead, where they lie beside the repository, and prints each beside the best driving time that is
 published. ``--memory LIBRARY`` also has the planners join plans of a library, of the one vehicle that
 ``--vehicles`` names; "from memory" is the share of questions answered by a plan of which a part was stored,
 and a line says how much sooner the robot is there so, with the 95 % interval, problems resampled.
-``--optimise`` has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over
-Reeds-Shepp curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame
-of its problem.
+``--optimise`` has every plan optimised, too, and counts that time. ``--others`` adds planners that are not
+ours, for cars without trailers: Hybrid A*, and of OMPL RRT-Connect, BIT* and informed RRT* over Reeds-Shepp
+curves. What they find is driven and polished as our plans are; a line says how much sooner than so the robot
+is there with ours. The authority judges every plan, in the frame of its problem.
 """
 
 from __future__ import annotations
@@ -35,10 +36,8 @@ from storage.archives.libraries import load_library
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tests.speed.given_manoeuvres import given_table
-from tests.speed.manoeuvre_attempts import SEED, Peer, Row, attempted
+from tests.speed.manoeuvre_attempts import OTHERS, SEED, Peer, Row, attempted
 
-OMPL: Final = "OMPL RRT-Connect, paths"
-OMPL_LIMIT_S: Final = 5.0
 NOTICED_S: Final = 0.05  # by so much a robot is later at least to be counted as later
 
 
@@ -82,8 +81,13 @@ def family_table(asked: argparse.Namespace) -> tuple[Table, list[str], list[str]
             for planner, found in rows.items()
             if planner.library is not None
         ]
-        if asked.ompl and not trailers_of(vehicle):
-            table.add_row(*label, OMPL, *_ompl_cells(problems, vehicle))
+        worth += [
+            f"{name} {difficulty}, {planner} beside {other}: {_sooner(rows[other], rows[planner])}"
+            for other in rows
+            if other.planner in OTHERS
+            for planner in rows
+            if planner.planner not in OTHERS
+        ]
         table.add_section()
     return table, refused, worth
 
@@ -97,6 +101,8 @@ def _sooner(alone: list[Row], joined: list[Row]) -> str:
         ]
     )
     sooner = (total[0] - total[1])[~np.isnan(total).any(axis=0)]
+    if len(sooner) < 2:
+        return f"both solve {len(sooner)}"
     low, high = bootstrap((sooner,), np.mean, rng=np.random.default_rng(1)).confidence_interval
     later = np.count_nonzero(sooner < -NOTICED_S)
     return f"{sooner.mean():.2f} s sooner [{low:.2f}, {high:.2f}], later in {later} of {len(sooner)}"
@@ -107,27 +113,15 @@ def _peers(asked: argparse.Namespace, vehicle: Vehicle | None = None) -> list[Pe
     libraries = (
         [None] if asked.memory is None or vehicle is None else [None, load_library(asked.memory, vehicle)]
     )
-    return [
+    peers = [
         Peer(name, optimised, library)
         for name in asked.planners
         for library in libraries
         for optimised in [False, True][: 1 + asked.optimise]
     ]
-
-
-def _ompl_cells(problems: Sequence[Problem], vehicle: Vehicle) -> list[str]:
-    """Solved and times of OMPL's paths, and no more, since they are no plans."""
-    from tests.speed.peers.reeds_shepp import reeds_shepp_path  # late: OMPL may not be installed
-
-    paths = [reeds_shepp_path(problem, vehicle, "RRTConnect", SEED, OMPL_LIMIT_S) for problem in problems]
-    ms = 1e3 * np.array([path.seconds for path in paths])
-    times = (np.median(ms), ms.mean(), np.quantile(ms, 0.99))
-    return [
-        f"{np.mean([path.solved for path in paths]):.1%}",
-        "-",
-        *(f"{each:.1f}" for each in times),
-        *4 * ["-"],
-    ]
+    if vehicle is not None and not trailers_of(vehicle):
+        peers += [Peer(name, False) for name in asked.others]
+    return peers
 
 
 def _asked_families(asked: argparse.Namespace) -> Iterator[tuple[str, str, Vehicle]]:
@@ -201,7 +195,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=["lattice"])
     parser.add_argument("--memory", type=Path, help="a library of `gather`, of the one vehicle that is asked")
     parser.add_argument("--optimise", action="store_true", help="optimise each plan too")
-    parser.add_argument("--ompl", action="store_true", help="beside OMPL's paths of Reeds-Shepp curves")
+    parser.add_argument("--others", nargs="+", choices=OTHERS, default=[], help="planners that are not ours")
     parser.add_argument("--given", action="store_true", help="ask the problems of others instead")
     return parser
 

@@ -10,13 +10,16 @@ from functools import cache
 import numpy as np
 import pytest
 
+from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
+from planners.world.classes.families import family
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR
+from planners.world.workspace import Workspace
 from tests.speed.peers.answer import MissingError
 from tests.speed.peers.native import Native
 from tests.speed.peers.settings import KPIECE1, RRT
@@ -46,6 +49,24 @@ def test_a_plan_of_the_wheel_is_a_plan_by_our_rules() -> None:
     answer = Wheel().kpiece1(problem(), 1, LIMIT_S, KPIECE1)
     assert answer.plan is not None
     assert faults(problem(), answer.plan) == []
+
+
+@pytest.mark.slow  # its kernels take half a minute to compile
+def test_curves_of_others_are_driven_by_our_rules() -> None:
+    pytest.importorskip("ompl", reason="the ompl wheel is not here", exc_type=ImportError)
+    from tests.speed.peers.hybrid_astar import hybrid_astar
+    from tests.speed.peers.reeds_shepp import reeds_shepp_plan
+
+    workspace = Workspace()
+    for name in ("parallel", "angled"):
+        slot = to_canonical(family(name, "easy", CAR).draw(77, 1))[0]
+        again, found = (hybrid_astar(slot, CAR, workspace).plan for _ in range(2))
+        of_ompl = reeds_shepp_plan(slot, CAR, "RRTConnect", 1, LIMIT_S, workspace).plan
+        assert again is not None
+        assert found is not None
+        assert of_ompl is not None
+        assert np.array_equal(again.states, found.states)
+        assert faults(slot, found, CAR) == faults(slot, of_ompl, CAR) == []
 
 
 @pytest.mark.parametrize("motion", [(), (2.0, 0.1)], ids=["from rest", "moving"])

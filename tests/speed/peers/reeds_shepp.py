@@ -1,8 +1,8 @@
 """OMPL's geometric planners over Reeds-Shepp curves, from its Python wheel. ImportError without it.
 
-What comes of it is a path for a car that steers at once and stands wherever its curvature changes: no plan
-by our definition, so only whether one was found, how soon and how long it is can be compared. Paths are
-checked with our jitted collision check of the vehicle at rest, called from OMPL.
+What comes of it is a path for a car that steers at once. It is driven over its curves from rest to rest and
+polished as our plans are, which counts. Paths are checked with our jitted collision check, called from OMPL
+by way of Python, which takes longer than the check.
 """
 
 from __future__ import annotations
@@ -13,29 +13,40 @@ from typing import Any, NamedTuple
 
 from ompl import base, geometric, util
 
+from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
 from planners.world.geometry.collision import scene_of, state_is_free
 from planners.world.jit import jit
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.dynamics import tightest_bend, turning_speed
 from planners.world.vehicles.vehicle import Car
+from planners.world.workspace import Workspace
+from tests.speed.peers.curves import driven_over
 
-_STEP_M = 0.05  # between two states of a path that are checked
+_STEP_M = 0.02  # between two states of a path that are checked
 
 
-class Path(NamedTuple):
+class Found(NamedTuple):
     """One attempt."""
 
-    solved: bool
+    plan: Plan | None  # None also where a path was found whose curves cannot be driven
     seconds: float  # of its processor
-    metres: float | None
 
 
 @jit
 def _is_free(x: float, y: float, heading: float, vehicle: Car, scene: Any) -> bool:
-    return state_is_free((x, y, heading, 0.0, 0.0), vehicle, scene)
+    """Whether a pose is free, with room for all within a step of it that is checked when it is driven."""
+    speed = (_STEP_M + stride_of(1.0, vehicle) / FINE) / vehicle.dt
+    for turn in (-1.0, 1.0):
+        bend = turn * tightest_bend(turning_speed(vehicle), vehicle)
+        if not state_is_free(at_pace((x, y, heading, 0.0, 0.0), speed, bend, vehicle), vehicle, scene):
+            return False
+    return True
 
 
-def reeds_shepp_path(problem: Problem, vehicle: Car, planner: str, seed: int, limit_s: float) -> Path:
-    """The first path of a ``planner`` of OMPL, such as ``RRTConnect``, to the goal pose of a problem."""
+def reeds_shepp_plan(
+    problem: Problem, vehicle: Car, planner: str, seed: int, limit_s: float, workspace: Workspace
+) -> Found:
+    """Drive the path of a ``planner`` of OMPL to the goal pose: the first, or the best within the limit."""
     assert problem.arrival is not None
     util.noOutputHandler()
     util.RNG.setSeed(seed)
@@ -62,8 +73,11 @@ def reeds_shepp_path(problem: Problem, vehicle: Car, planner: str, seed: int, li
     setup.setStartAndGoalStates(*ends)
     setup.setPlanner(getattr(geometric, planner)(setup.getSpaceInformation()))
     setup.solve(limit_s)
+    plan = None
+    if setup.haveExactSolutionPath():
+        states = setup.getSolutionPath().getStates()
+        poses = [(state.getX(), state.getY(), state.getYaw()) for state in states]
+        plan = driven_over(poses, problem, vehicle, scene, workspace)
     seconds = thread_time() - began
-    solved = setup.haveExactSolutionPath()
-    metres = problem.scale * setup.getSolutionPath().length() if solved else None
     setup.clear()
-    return Path(solved, seconds, metres)
+    return Found(plan, seconds)
