@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.search.connection.pose_table import seconds_to_pose
+from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.enclosure import is_closed
@@ -33,12 +33,12 @@ from planners.search.manoeuvres.variants import (
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Other
 from planners.search.query import Endings, Query, after_prefix, prefix_of
-from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
+from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go, metres_to_go
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, window_of
-from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
+from planners.world.goal import HEADING, LEAST_SPEED, MOST_SPEED, SLACK, X, Y
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import state_size
 
@@ -50,6 +50,10 @@ PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that lo
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
+DETOUR: Final = (
+    1.35  # times as long as if nothing were in the way, or only cells: then a drive may be one ...
+)
+FROM_START: Final = 512  # ... and is worth so many expansions out of the start
 TURNS: Final = 32  # of both trees between two looks at the clock ...
 AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -117,6 +121,7 @@ class Manoeuvring:
         self._may_loop = self._may_mend
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
+        self._least_s = self._least_seconds()
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
         self._grow(0)  # compiled, if need be, before the planner's clock runs
@@ -205,7 +210,32 @@ class Manoeuvring:
         self._soon = [other for other in self._kept if other is not None]
         while self._finds_drive(min(began + self._worth(*longer), last), until):
             self._keep()
+        if longer[0] > 0 and self._may_be_detour:
+            self._search_from_start(min(self.expansions + FROM_START, last), until)
         return last - self.expansions
+
+    @property
+    def _may_be_detour(self) -> bool:
+        """Whether all that was found takes long for what it is, and another search may tell."""
+        if self.meets or not self._stands or self._grows_both or not self.kept:
+            return False
+        return bool(self._drive.ways.seconds.min() > DETOUR * self._least_s)
+
+    def _search_from_start(self, end: int, until: float) -> None:
+        """Search once more, out of the start alone, and keep what is found.
+
+        A tree out of a slot is soon led to drive on as it left it: into the slot backwards, and backwards all
+        the way. Out of the start it drives forwards for as long as that is quicker.
+        """
+        self._level = self._spent = 0
+        self._begin()
+        while self.expansions < end and (left := until - working_clock()) > 0.0:
+            most = (TURNS if left > AMPLE_S else 1) * TURN
+            found, used = self._grow(min(end - self.expansions, most), from_start=True)
+            if found:
+                self._keep()
+            elif used == 0:
+                return
 
     def _worth(self, longest: int, least: int) -> int:
         """How many expansions the quickest drive is worth that was found, if there is one."""
@@ -285,6 +315,14 @@ class Manoeuvring:
         plan = Plan(states, controls, self._vehicle.dt)
         self._kept[keep_last(drive.ways)] = Other(plan, self.joined)
 
+    def _least_seconds(self) -> float:
+        """The time from the start to the goal if nothing is in the way, or only cells that are not free."""
+        known, top = self._known, self._vehicle.max_speed
+        x, y, heading = known.start[0, :3].tolist()
+        pose = float(self._goal[X]), float(self._goal[Y]), float(self._goal[HEADING])
+        turns = seconds_from(x, y, heading, pose, known.table, top)
+        return max(turns, metres_to_go(*pose[:2], known.go) / top)
+
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
@@ -301,26 +339,30 @@ class Manoeuvring:
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
             forget_near(self._drive.near)
 
-    def _grow(self, most: int) -> tuple[bool, int]:
+    def _grow(self, most: int, from_start: bool = False) -> tuple[bool, int]:
         """Grow the trees by some expansions at most; whether there is a drive, and how many they were.
 
-        Without trailers the tree out of the start grows, too, if only that is tight, or later.
+        Without trailers the tree out of the start grows, too, if only that is tight, or later; or alone.
         """
+        from_goal = self._tree, self._known, self._outgoing
+        from_there = self._other, self._known_there, self._leaving
+        first, second = (from_there, from_goal) if from_start else (from_goal, from_there)
+        (tree, known, outgoing), (other, known_there, leaving) = first, second
+        both = self._grows_both and not from_start
         needs_both = not self.meets and not self.kept
-        level = suited(self._level, self._vehicle)
-        known = self._known, self._known_there
-        vehicles = self._outgoing, self._leaving, self._vehicle
+        settings = self._goal, self._drive, suited(self._level, self._vehicle)
         found, used, self._ended = grow_trees(
-            self._tree,
-            self._other,
+            tree,
+            other,
             most,
-            self._grows_both,
+            both,
             needs_both,
-            *known,
-            self._goal,
-            self._drive,
-            level,
-            *vehicles,
+            known,
+            known_there,
+            *settings,
+            outgoing,
+            leaving,
+            self._vehicle,
             self._scene,
         )
         self.expansions += used

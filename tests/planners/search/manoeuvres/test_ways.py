@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -76,7 +78,7 @@ def quickest_of(query: Query, found: Outcome) -> float:
 
 @pytest.mark.parametrize(
     ("name", "difficulty", "vehicle", "seed", "short", "long"),
-    [("lot", "standard", "car", 11, 0, 17), ("yard", "hard", "car-1-trailer", 7, 24, 21)],
+    [("lot", "standard", "car", 11, 2, 17), ("yard", "hard", "car-1-trailer", 7, 24, 21)],
 )
 def test_after_a_long_drive_the_search_goes_on_and_keeps_what_it_had(
     name: str, difficulty: str, vehicle: str, seed: int, short: int, long: int
@@ -92,6 +94,22 @@ def test_after_a_long_drive_the_search_goes_on_and_keeps_what_it_had(
         saved[number] = quickest_of(query, soon) - quickest_of(query, whole)
     assert longer[short] == 0
     assert saved[long] > 2.0
+
+
+def test_what_backs_a_long_way_may_be_a_detour_and_a_search_from_the_start_tells() -> None:
+    saved = []
+    for number in (40, 41, 46):
+        problem = to_canonical(family("lot", "standard").draw(5, number))[0]
+        query = asked(problem)
+        found = PLANNERS["lattice"](query)
+        with mock.patch.object(manoeuvring, "DETOUR", math.inf):
+            without = PLANNERS["lattice"](query)
+        assert found.expansions <= without.expansions + manoeuvring.FROM_START
+        for each in found.others:
+            assert faults(problem, each.plan, CAR) == []
+        saved.append(quickest_of(query, without) - quickest_of(query, found))
+    assert min(saved) == 0.0
+    assert max(saved) > 5.0
 
 
 def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
