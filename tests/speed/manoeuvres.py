@@ -9,7 +9,7 @@ published. ``--memory LIBRARY`` also has the planners join plans of a library, o
 ``--vehicles`` names; "from memory" is the share of questions answered by a plan of which a part was stored,
 and a line says how much sooner the robot is there so, with the 95 % interval, problems resampled.
 ``--optimise`` has every plan optimised, too, and counts that time. ``--others`` adds planners that are not
-ours, for cars without trailers: Hybrid A*, and of OMPL RRT-Connect, BIT* and informed RRT* over Reeds-Shepp
+ours, for cars that reverse: Hybrid A*, and of OMPL RRT-Connect, BIT* and informed RRT* over Reeds-Shepp
 curves. What they find is driven and polished as our plans are; a line says how much sooner than so the robot
 is there with ours. The authority judges every plan, in the frame of its problem.
 """
@@ -30,7 +30,7 @@ from planners.search.registry import PLANNERS
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
 from planners.world.classes.problem_classes import DIFFICULTIES
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import Vehicle, trailers_of
+from planners.world.vehicles.vehicle import Car, Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_library
 from storage.vehicles.vehicle_files import said_vehicle
@@ -92,12 +92,12 @@ def family_table(asked: argparse.Namespace) -> tuple[Table, list[str], list[str]
     return table, refused, worth
 
 
-def _sooner(alone: list[Row], joined: list[Row]) -> str:
-    """How much sooner the robot is there with a library, planning and driving counted, where both solve."""
+def _sooner(others: list[Row], ours: list[Row]) -> str:
+    """How much sooner the robot is there than with others, planning and driving, where both solve."""
     total = np.array(
         [
             [row.attempt.planning_seconds + (row.attempt.duration_s or np.nan) for row in rows]
-            for rows in (alone, joined)
+            for rows in (others, ours)
         ]
     )
     sooner = (total[0] - total[1])[~np.isnan(total).any(axis=0)]
@@ -119,7 +119,7 @@ def _peers(asked: argparse.Namespace, vehicle: Vehicle | None = None) -> list[Pe
         for library in libraries
         for optimised in [False, True][: 1 + asked.optimise]
     ]
-    if vehicle is not None and not trailers_of(vehicle):
+    if isinstance(vehicle, Car) and vehicle.min_speed < 0.0:
         peers += [Peer(name, False) for name in asked.others]
     return peers
 

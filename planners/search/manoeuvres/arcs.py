@@ -73,8 +73,9 @@ def leapt(state: State, leap: Leap, vehicle: Vehicle) -> State:
     sin, cos = sincos(state[2])
     x = state[0] + cos * leap[0] - sin * leap[1]
     y = state[1] + sin * leap[0] + cos * leap[1]
-    after = (x, y, state[2] + leap[2], leap[3], leap[4], *state[5:])
-    return trailing(after, leap[2] / vehicle.dt, vehicle)
+    speed = min(max(leap[3], vehicle.min_speed), vehicle.max_speed)
+    after = (x, y, state[2] + leap[2], speed, leap[4], *state[5:])
+    return trailing(after, leap[3], leap[2] / vehicle.dt, vehicle)
 
 
 @inlined

@@ -119,7 +119,7 @@ def follow(start: Floats, join: Join, vehicle: Vehicle) -> None:
 
 @inlined
 def _carry(join: Join, k: int, column: int, after: State) -> None:
-    """Note in a column what it does at the meeting that arc ``k`` leads to ``after``: without the hitches."""
+    """Note in a column how the pose at the meeting changes if arc ``k`` leads to ``after``."""
     end = 0 if k < join.counts[BEFORE] else 2
     turned = after[2] - join.ways[k, 2]
     join.effects[0, column] = after[0] - join.ways[k, 0] - turned * (join.ends[end, 1] - join.ways[k, 1])
@@ -129,7 +129,7 @@ def _carry(join: Join, k: int, column: int, after: State) -> None:
 
 @inlined
 def _carried_hitch(join: Join, k: int, row: int, after: State, hitches: int) -> float:
-    """What it does to hitch ``row`` at the meeting that arc ``k`` leads to ``after``."""
+    """How hitch ``row`` at the meeting changes if arc ``k`` leads to ``after``."""
     total = 0.0
     for j in range(hitches):
         total += join.carried[0, row, j] * (after[5 + j] - join.ways[k, 5 + j])
@@ -140,8 +140,8 @@ def _carried_hitch(join: Join, k: int, row: int, after: State, hitches: int) -> 
 def find_effects(start: Floats, join: Join, vehicle: Vehicle) -> None:
     """Find what more bend and length of each arc do at the meeting, after ``follow``.
 
-    Each arc is nudged alone: what follows it turns and moves as a whole, but for the hitches, of which is
-    carried on from arc to arc what they do at the meeting.
+    Each arc is nudged alone: what follows it turns and moves as a whole, and the effect of its hitches is
+    carried on from arc to arc.
     """
     before, arcs = join.counts[BEFORE], join.counts[ARCS]
     hitches = numbers_of(start, vehicle) - 5

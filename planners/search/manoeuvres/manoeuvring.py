@@ -54,7 +54,7 @@ DETOUR: Final = (
     1.35  # times as long as if nothing were in the way, or only cells: then a drive may be one ...
 )
 FROM_START: Final = 512  # ... and is worth so many expansions out of the start
-TURNS: Final = 32  # of both trees between two looks at the clock ...
+TURNS: Final = 8  # of both trees between two looks at the clock ...
 AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
@@ -121,7 +121,8 @@ class Manoeuvring:
         self._may_loop = self._may_mend
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
-        self._least_s = self._least_seconds()
+        # costs are not compared with it: who pays for more than time has a search by time alone as well
+        self._least_s = self._least_seconds() if counting_time(vehicle) == vehicle else math.inf
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
         self._grow(0)  # compiled, if need be, before the planner's clock runs
@@ -216,7 +217,7 @@ class Manoeuvring:
 
     @property
     def _may_be_detour(self) -> bool:
-        """Whether all that was found takes long for what it is, and another search may tell."""
+        """Whether all that was found takes long, and only the tree out of the goal has grown."""
         if self.meets or not self._stands or self._grows_both or not self.kept:
             return False
         return bool(self._drive.ways.seconds.min() > DETOUR * self._least_s)
@@ -344,9 +345,9 @@ class Manoeuvring:
 
         Without trailers the tree out of the start grows, too, if only that is tight, or later; or alone.
         """
-        from_goal = self._tree, self._known, self._outgoing
-        from_there = self._other, self._known_there, self._leaving
-        first, second = (from_there, from_goal) if from_start else (from_goal, from_there)
+        goal_side = self._tree, self._known, self._outgoing
+        start_side = self._other, self._known_there, self._leaving
+        first, second = (start_side, goal_side) if from_start else (goal_side, start_side)
         (tree, known, outgoing), (other, known_there, leaving) = first, second
         both = self._grows_both and not from_start
         needs_both = not self.meets and not self.kept

@@ -40,7 +40,7 @@ from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
-TURN: Final = 64  # expansions of both trees before it is the first one's turn again
+TURN: Final = 64  # expansions of both trees together before each has another turn
 
 
 class Outward(NamedTuple):
@@ -308,23 +308,23 @@ def grow_trees(
     vehicle: Vehicle,
     scene: Scene,
 ) -> tuple[bool, int, bool]:
-    """Grow the tree out of the goal, and in turn with it the ``other`` out of the start if ``both`` grow.
+    """Grow a tree; if ``both`` grow, the ``other`` one out of the other end as well, first in each turn.
 
     It is one call, because to hand all of this over from Python takes as long as some expansions.
 
     Args:
-        tree: out of the goal; ``known`` and ``outgoing`` are for it.
-        other: out of the start; ``known_there`` and ``leaving`` are for it.
+        tree: out of the goal, or out of the start; ``known`` and ``outgoing`` are for it.
+        other: out of the other end; ``known_there`` and ``leaving`` are for it.
         most: expansions of both.
         both: whether both grow.
         needs_both: whether to end where the other cannot grow.
-        known: what leads to the start.
-        known_there: what leads to the goal.
+        known: what leads on from the tree to the other end.
+        known_there: what leads on from the other tree.
         goal: that of ``goal_of``.
         drive: buffers.
         settings: how they grow.
-        outgoing: the vehicle as it drives out of the goal.
-        leaving: the vehicle as it drives out of the start.
+        outgoing: the vehicle as it drives out of the root of the tree.
+        leaving: the vehicle as it drives out of the root of the other one.
         vehicle: the vehicle itself.
         scene: what must not be met.
 

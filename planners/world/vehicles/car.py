@@ -88,7 +88,7 @@ def _step(state: State, first: float, second: float, vehicle: Car) -> State:
 
 
 @implements(interface.trailing, Car)
-def _trailing(state: State, turn: float, vehicle: Car) -> State:
+def _trailing(state: State, speed: float, turn: float, vehicle: Car) -> State:
     return state
 
 

@@ -143,8 +143,8 @@ def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -
 
 
 @implements(interface.trailing, CarWithTrailers)
-def _trailing(state: State, turn: float, vehicle: CarWithTrailers) -> State:
-    speeds = (state[3], state[3], state[3])
+def _trailing(state: State, speed: float, turn: float, vehicle: CarWithTrailers) -> State:
+    speeds = (speed, speed, speed)
     hitches = _hitches_after(vehicle.dt, speeds, (turn, turn, turn), state, vehicle)
     return (*state[:5], *_as_many(hitches, state))
 

@@ -46,7 +46,7 @@ def _step(state: State, first: float, second: float, vehicle: DifferentialDrive)
 
 
 @implements(interface.trailing, DifferentialDrive)
-def _trailing(state: State, turn: float, vehicle: DifferentialDrive) -> State:
+def _trailing(state: State, speed: float, turn: float, vehicle: DifferentialDrive) -> State:
     return state
 
 

@@ -55,8 +55,8 @@ def step(state: State, first: float, second: float, vehicle: Vehicle) -> State:
 
 
 @by_vehicle
-def trailing(state: State, turn: float, vehicle: Vehicle) -> State:
-    """The state with its trailers where they are after a step at its speed and a turn rate (rad/s).
+def trailing(state: State, speed: float, turn: float, vehicle: Vehicle) -> State:
+    """The state with its trailers where they are after a step at a speed (m/s) and a turn rate (rad/s).
 
     ``state`` holds the pose after the step, and the hitch angles before it.
     """

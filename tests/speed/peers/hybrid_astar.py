@@ -1,9 +1,9 @@
 """Hybrid A* (Dolgov et al., IJRR 2010), the planner of manoeuvres that the field begins with, for cars.
 
-It searches from the start over short arcs in both gears, one state for each cell of place and heading, by
-cost so far and the larger of two estimates: turns without obstacles, and the way over free cells. Every few
-states it tries the shortest Reeds-Shepp curve to the goal. What it finds is driven from rest to rest by the
-same code as the arcs of our search, and polished by our optimiser, in place of the smoothing that
+It searches from the start over short arcs in both gears, one state for each cell, heading and gear, by cost
+so far and the larger of two estimates: turns without obstacles, and the way over free cells. From each state,
+or every few, it tries the shortest Reeds-Shepp curve to the goal. What it finds is driven from rest to rest
+by the same code as the arcs of our search, and polished by our optimiser, in place of the smoothing that
 others do by descent or optimal control. Collision checks, curves, cells and queue are ours, so that only the
 search is compared. ``python -m tests.speed.peers.hybrid_astar`` tunes its settings.
 """
@@ -49,7 +49,7 @@ from planners.world.vehicles.vehicle import CAR, Car, Vehicle, state_size
 from planners.world.workspace import Workspace
 from tests.speed.peers.curves import ARCS, Curves, add_curve, allocate_curves, drive_arcs, driven
 
-NODES: Final = 1 << 17
+NODES: Final = 1 << 20  # each expansion stores ten at most
 EXPANSIONS: Final = 60_000  # as our search has for a pose
 GOAL_CELL_M: Final = 0.1  # around the goal that counts as there
 
@@ -157,7 +157,7 @@ def _find(
 ) -> tuple[bool, int]:
     """Search from ``start [1, S]``.
 
-    Returns whether ``search.drive`` leads to the goal, and how many expansions there were.
+    Returns whether ``search.curves.drive`` leads to the goal, and how many expansions there were.
     """
     size = vehicle.front + vehicle.rear
     cell = settings.cell * size

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from time import thread_time
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from ompl import base, geometric, util
 
+from planners.search.connection.connection import radius_at
 from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
 from planners.world.geometry.collision import scene_of, state_is_free
 from planners.world.jit import jit
@@ -22,6 +23,7 @@ from planners.world.vehicles.vehicle import Car
 from planners.world.workspace import Workspace
 from tests.speed.peers.curves import driven_over
 
+IMPROVING: Final = ("BITstar", "InformedRRTstar")  # these go on to shorten their paths; others are simplified
 _STEP_M = 0.02  # between two states of a path that are checked
 
 
@@ -52,7 +54,7 @@ def reeds_shepp_plan(
     util.RNG.setSeed(seed)
     began = thread_time()
     scene = scene_of(problem)
-    space = base.ReedsSheppStateSpace(vehicle.wheelbase / math.tan(vehicle.max_steering))
+    space = base.ReedsSheppStateSpace(radius_at(turning_speed(vehicle), vehicle))
     bounds = base.RealVectorBounds(2)
     for i in range(2):
         bounds.setLow(i, problem.bounds[i])
@@ -75,6 +77,8 @@ def reeds_shepp_plan(
     setup.solve(limit_s)
     plan = None
     if setup.haveExactSolutionPath():
+        if planner not in IMPROVING:
+            setup.simplifySolution()
         states = setup.getSolutionPath().getStates()
         poses = [(state.getX(), state.getY(), state.getYaw()) for state in states]
         plan = driven_over(poses, problem, vehicle, scene, workspace)
