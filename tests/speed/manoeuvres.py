@@ -94,18 +94,22 @@ def family_table(asked: argparse.Namespace) -> tuple[Table, list[str], list[str]
 
 def _sooner(others: list[Row], ours: list[Row]) -> str:
     """How much sooner the robot is there than with others, planning and driving, where both solve."""
-    total = np.array(
-        [
-            [row.attempt.planning_seconds + (row.attempt.duration_s or np.nan) for row in rows]
-            for rows in (others, ours)
-        ]
+    planning, driving = (
+        np.array([[getattr(row.attempt, name) or np.nan for row in rows] for rows in (others, ours)])
+        for name in ("planning_seconds", "duration_s")
     )
-    sooner = (total[0] - total[1])[~np.isnan(total).any(axis=0)]
+    by_driving = driving[0] - driving[1]
+    both = ~np.isnan(by_driving)
+    sooner = (planning[0] - planning[1] + by_driving)[both]
     if len(sooner) < 2:
         return f"both solve {len(sooner)}"
     low, high = bootstrap((sooner,), np.mean, rng=np.random.default_rng(1)).confidence_interval
     later = np.count_nonzero(sooner < -NOTICED_S)
-    return f"{sooner.mean():.2f} s sooner [{low:.2f}, {high:.2f}], later in {later} of {len(sooner)}"
+    driven = by_driving[both].mean()
+    return (
+        f"{sooner.mean():.2f} s sooner [{low:.2f}, {high:.2f}], {driven:.2f} by driving, "
+        f"later in {later} of {len(sooner)}"
+    )
 
 
 def _peers(asked: argparse.Namespace, vehicle: Vehicle | None = None) -> list[Peer]:

@@ -31,8 +31,6 @@ from planners.search.structures.frontier import (
     is_empty,
     pop,
     push,
-    reach,
-    was_reached,
 )
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Integers, Pose
@@ -50,6 +48,7 @@ from planners.world.workspace import Workspace
 from tests.speed.peers.curves import ARCS, Curves, add_curve, allocate_curves, drive_arcs, driven
 
 NODES: Final = 1 << 20  # each expansion stores ten at most
+SLOTS: Final = 1 << 20  # of the table of cells, more than there can be cells
 EXPANSIONS: Final = 60_000  # as our search has for a pose
 GOAL_CELL_M: Final = 0.1  # around the goal that counts as there
 
@@ -57,10 +56,10 @@ GOAL_CELL_M: Final = 0.1  # around the goal that counts as there
 class Settings(NamedTuple):
     """What is tuned (``python -m tests.speed.peers.hybrid_astar``); lengths are in those of the vehicle."""
 
-    cell: float = 0.15
+    cell: float = 0.1
     headings: int = 96
-    arc: float = 0.2  # length of an arc
-    bends: int = 2  # on each side of 0: so many steering angles
+    arc: float = 0.1  # length of an arc
+    bends: int = 3  # on each side of 0: so many steering angles
     gear_change_s: float = 1.0
     bend_change_s: float = 0.1  # for a change by the tightest bend
     weight: float = 1.5  # of the estimate
@@ -73,6 +72,10 @@ SETTINGS: Final = Settings()
 class Search(NamedTuple):
     """Buffers."""
 
+    keys: Integers  # [SLOTS] of the cells that were reached
+    least: Floats  # [SLOTS] the seconds of the quickest way to each
+    numbers: Integers  # [SLOTS] the number of the search that reached it
+    counts: Integers  # [1] the number of this search
     frontier: Frontier
     states: Floats  # [NODES, 5]
     seconds: Floats  # [NODES]
@@ -89,6 +92,10 @@ def allocate_search(vehicle: Vehicle) -> Search:
     """Buffers for a vehicle, with its table of turns."""
     floats = np.zeros((4, NODES))
     return Search(
+        np.zeros(SLOTS, np.int64),
+        np.zeros(SLOTS),
+        np.zeros(SLOTS, np.int32),
+        np.zeros(1, np.int32),
         allocate_frontier(),
         np.zeros((NODES, state_size(vehicle))),
         floats[0],
@@ -108,6 +115,27 @@ def _key(state: State, gear: float, cell: float, headings: int) -> int:
     row = math.floor(state[1] / cell) & 0xFFFF
     turn = int((wrapped(state[2]) + math.pi) * headings / (2.0 * math.pi)) % headings
     return ((((column << 16) | row) * headings + turn) << 1) | (1 if gear > 0.0 else 0)
+
+
+@inlined
+def _slot(key: int, search: Search) -> int:
+    """Where a cell is in the table, or where it would be."""
+    slot = (key * 2654435761) % SLOTS
+    while search.numbers[slot] == search.counts[0] and search.keys[slot] != key:
+        slot = (slot + 1) % SLOTS
+    return slot
+
+
+@inlined
+def _is_quicker(key: int, seconds: float, search: Search) -> bool:
+    """Whether a cell was not reached so quickly before; noted."""
+    slot = _slot(key, search)
+    if search.numbers[slot] == search.counts[0] and search.least[slot] <= seconds:
+        return False
+    search.numbers[slot] = search.counts[0]
+    search.keys[slot] = key
+    search.least[slot] = seconds
+    return True
 
 
 @inlined
@@ -170,6 +198,8 @@ def _find(
     store(search.states, 0, state)
     search.seconds[0] = search.gears[0] = search.bends[0] = 0.0
     search.parents[0] = -1
+    search.counts[0] += 1
+    _is_quicker(_key(state, 0.0, cell, settings.headings), 0.0, search)
     push(frontier, 0.0, 0, 0)
     expansions = 0
     wait = 0
@@ -177,9 +207,8 @@ def _find(
         node, _ = pop(frontier)
         state = load(search.states, node, vehicle)
         key = _key(state, search.gears[node], cell, settings.headings)
-        if was_reached(frontier, key):
-            continue
-        reach(frontier, key)
+        if search.seconds[node] > search.least[_slot(key, search)]:
+            continue  # there was a quicker way meanwhile
         expansions += 1
         wait -= 1
         if wait <= 0:
@@ -204,12 +233,12 @@ def _find(
                         break
                 if free < stride_m or nodes == NODES:
                     continue
-                if was_reached(frontier, _key(after, gear, cell, settings.headings)):
-                    continue
                 seconds = search.seconds[node] + strides * stride_m / top
                 if gear * search.gears[node] < 0.0:
                     seconds += settings.gear_change_s
                 seconds += settings.bend_change_s * abs(bend - search.bends[node]) / limit
+                if not _is_quicker(_key(after, gear, cell, settings.headings), seconds, search):
+                    continue
                 store(search.states, nodes, after)
                 search.metres[nodes] = strides * stride_m
                 search.seconds[nodes] = seconds
