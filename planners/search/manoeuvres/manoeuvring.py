@@ -50,9 +50,7 @@ PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that lo
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
-DETOUR: Final = (
-    1.35  # times as long as if nothing were in the way, or only cells: then a drive may be one ...
-)
+DETOUR: Final = 1.35  # times as long as if nothing were in the way, or only cells: a drive may be one ...
 FROM_START: Final = 512  # ... and is worth so many expansions out of the start
 TURNS: Final = 8  # of both trees between two looks at the clock ...
 AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
@@ -70,6 +68,11 @@ def allocate_way_from_start(goes_on: bool) -> CostToGo:
 def allocate_trees(state_size: int, number: int) -> tuple[PoseTree, PoseTree]:
     """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
     return allocate_pose_tree(state_size), allocate_pose_tree(state_size)
+
+
+def _turns(left_s: float) -> int:
+    """How many turns of the trees lie between two looks at the clock, if so many seconds are left."""
+    return TURNS if left_s > AMPLE_S else 1
 
 
 class Manoeuvring:
@@ -231,8 +234,7 @@ class Manoeuvring:
         self._level = self._spent = 0
         self._begin()
         while self.expansions < end and (left := until - working_clock()) > 0.0:
-            most = (TURNS if left > AMPLE_S else 1) * TURN
-            found, used = self._grow(min(end - self.expansions, most), from_start=True)
+            found, used = self._grow(min(end - self.expansions, _turns(left) * TURN), from_start=True)
             if found:
                 self._keep()
             elif used == 0:
@@ -257,7 +259,7 @@ class Manoeuvring:
             return True
         while self.expansions < end and not self.is_over and (left := until - working_clock()) > 0.0:
             level_ends = self._expansions - self._spent
-            turns = TURNS if left > AMPLE_S else 1
+            turns = _turns(left)
             if self._may_mend:
                 turns = min(turns, max(math.ceil((self._mend_at - self.expansions) / TURN), 1))
             found, used = self._grow(min(end - self.expansions, level_ends, turns * TURN))

@@ -26,7 +26,9 @@ STEP = 1e-5
 
 
 @pytest.mark.parametrize("lateral", [math.inf, 0.5])
-@pytest.mark.parametrize("name", ["differential-drive", "car-first-order", "car-3-trailers"])
+@pytest.mark.parametrize(
+    "name", ["car", "car-first-order", "differential-drive", "car-2-trailers", "car-3-trailers"]
+)
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_the_gradient_of_nearness_is_that_of_its_cost(name: str, lateral: float, seed: int) -> None:

@@ -20,7 +20,7 @@ from planners.world.jit import lean
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.trigonometry import sincos, wrapped
 from planners.world.vehicles.dynamics import State, load, tightest_bend, turning_speed
-from planners.world.vehicles.vehicle import Car, Vehicle
+from planners.world.vehicles.vehicle import Car, Vehicle, state_size
 from planners.world.workspace import Workspace
 
 ARCS: Final = 1 << 10
@@ -108,7 +108,7 @@ def driven_over(
     poses: Sequence[Pose], problem: Problem, vehicle: Car, scene: Scene, workspace: Workspace
 ) -> Plan | None:
     """Drive the shortest curves from pose to pose, beginning at the start; None if they are blocked."""
-    curves = workspace.buffers(allocate_curves, 5)
+    curves = workspace.buffers(allocate_curves, state_size(vehicle))
     start = start_state(problem, vehicle)
     state, count = tuple(start.tolist()), 0
     for pose in poses[1:]:

@@ -39,7 +39,7 @@ def first_problems(method, experience, draw, seed, count):
 
 @pytest.mark.parametrize("method", METHODS)
 @given(seed=SEEDS, which=st.integers(0, 7))
-@settings(max_examples=6)
+@settings(max_examples=10)
 def test_a_hallucinated_problem_is_solved_by_its_own_plan(experiences, draw, method, seed, which):
     experience = experiences[which]
     states = experience.plan.states
