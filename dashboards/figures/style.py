@@ -174,7 +174,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     Returns both paths. Raises StorageError if there is no room or no permission to write.
     """
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # it was applied just now; that takes longer than drawing
+    figure.set_layout_engine(None)  # it was applied just now; that takes longer than drawing
     paths = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = folder / f"{name}.{kind}"

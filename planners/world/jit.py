@@ -27,7 +27,7 @@ from numba.core.caching import (
     UserWideCacheLocator,
 )
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, compile_result
+from numba.core.compiler import Compiler, Flags, compile_result
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload, typeof_impl
 
@@ -108,6 +108,33 @@ class _KernelCache(FunctionCache):
         )
 
 
+class _Flags(Flags):
+    """Numba's flags, compared quickly: for each operation of a kernel it looks up whether that was typed before.
+
+    Its own take a sixth of the time of compiling for that, as they ask a property for each of their options.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _FLAGS_HASH
+
+    def values(self) -> dict[str, Any]:
+        return _DEFAULTS | self._values
+
+
+_DEFAULTS: dict[str, Any] = Flags().values()
+_FLAGS_HASH = hash(Flags())  # of the names of the options alone, so it is the same for all
+
+
+class _KernelCompiler(Compiler):
+    """Compiles a kernel."""
+
+    def __init__(self, *arguments: Any) -> None:
+        *others, flags, types_of_locals = arguments
+        super().__init__(*others, _Flags(flags), types_of_locals)
+
+
 class _LinkedLibrary(JITCodeLibrary):
     """LLVM's representation of a kernel that others call."""
 
@@ -131,7 +158,7 @@ class _NoMachineCode:
         pass
 
 
-class _LinkedCompiler(Compiler):
+class _LinkedCompiler(_KernelCompiler):
     """Compiles a kernel that others call."""
 
     def define_pipelines(self) -> list[Any]:
@@ -191,7 +218,7 @@ class _Kernel(CPUDispatcher):
     """A kernel as Python calls it."""
 
     def __init__(self, py_func: Callable[..., Any], locals: Any, targetoptions: dict[str, Any]) -> None:
-        super().__init__(py_func, locals, targetoptions)
+        super().__init__(py_func, locals, targetoptions, _KernelCompiler)
         self._cache = _KernelCache(py_func)
         self._linked = _Linked(py_func, locals, targetoptions)
 
