@@ -92,10 +92,13 @@ def read_worlds(
             a vehicle from a file.
         StorageError: Nothing can be read, the resolution is out of its range, or no world that is there can
             be used.
+        RunError: SciPy or shapely is not installed.
     """
-    from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
-    from storage.worlds.sources import source_at
-
+    try:
+        from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
+        from storage.worlds.sources import source_at
+    except ModuleNotFoundError as error:
+        raise RunError(f"Worlds need {error.name}: pip install 'motion-memory[optimise]'.") from None
     check_path("path", path)
     if count is not None:
         check_whole("count", count)

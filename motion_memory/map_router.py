@@ -25,6 +25,7 @@ from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
     check_drives_backwards,
+    check_options,
     check_route,
     checked_motion,
     in_frame_of,
@@ -105,7 +106,8 @@ class MapRouter:
             goal_hitches: hitch angles in poses, rad, one for each trailer; none: as they come.
 
         Raises:
-            ValueError: an argument is no such numbers, or the vehicle cannot move or stand so.
+            ValueError: an argument is no such numbers, no goal takes it, or the vehicle cannot move or stand
+                so.
             PlanFaultError: the independent judge refuses a plan.
         """
         scale = self._scale
@@ -123,6 +125,8 @@ class MapRouter:
             stops = stops_over(self._world, asked, self._vehicle, scale, goal_radius, tolerance, hitches)
         except ValueError as error:
             raise UsageError(f"The {error}.") from None
+        for_poses = {"goal_tolerance": tolerance, "goal_hitches": hitches}
+        check_options(stops, for_poses, {"goal_radius": goal_radius})
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
         self._solver.seconds.clear()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -111,6 +111,26 @@ def stops_over(
         else:
             stops.append(Stop(place, near / scale))
     return stops
+
+
+def check_options(
+    stops: Sequence[Stop], for_poses: Mapping[str, object], for_places: Mapping[str, object]
+) -> None:
+    """Raise UsageError if an option is given that no goal takes.
+
+    Args:
+        stops: the goals.
+        for_poses: by their names, the options that poses take; None or empty: not given.
+        for_places: the same for places.
+    """
+    poses = sum(stop.is_pose for stop in stops)
+    for options, kind, takers in (
+        (for_poses, "poses (x,y,heading)", poses),
+        (for_places, "places (x,y)", len(stops) - poses),
+    ):
+        for name, given in options.items():
+            if takers == 0 and given is not None and given != ():
+                raise UsageError(f"{name} is for {kind}, and no goal is one: leave it out.")
 
 
 def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> tuple[float, ...]:

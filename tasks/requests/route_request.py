@@ -17,7 +17,7 @@ from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, Source, source_at
-from tasks.requests.map_routes import checked_motion, stops_over
+from tasks.requests.map_routes import check_options, checked_motion, stops_over
 from tasks.settings.checks import check_known
 from tasks.settings.errors import UsageError
 
@@ -87,11 +87,8 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
         raise UsageError(f"--goal-hitch: {error}.") from None
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
-    for option, given in (("tolerance", request.goal_tolerance is not None), ("hitch", bool(hitches))):
-        if given and not any(stop.is_pose for stop in stops):
-            raise UsageError(f"--goal-{option} is for poses: give --to x,y,heading, or leave it out.")
-    if request.goal_radius is not None and all(stop.is_pose for stop in stops):
-        raise UsageError("--goal-radius is for places: give --to x,y, or leave it out.")
+    for_poses = {"--goal-tolerance": request.goal_tolerance, "--goal-hitch": hitches}
+    check_options(stops, for_poses, {"--goal-radius": request.goal_radius})
     return stops
 
 

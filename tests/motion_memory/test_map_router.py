@@ -105,6 +105,8 @@ def test_where_it_is_stuck_is_told(world: motion_memory.OccupancyMap, router: An
         ({"goal_tolerance": (0.1, -0.1)}, "goal_tolerance"),
         ({"goal_hitches": (0.1,)}, "hitch"),
         ({"goal_hitches": ("a",)}, "goal_hitches"),
+        ({"goal_tolerance": (0.1, 0.1)}, "goal_tolerance is for poses"),
+        ({"goals": [(60.0, 80.0, 0.0)], "goal_radius": 1.0}, "goal_radius is for places"),
         ({"start_motion": (1e3,)}, "speed"),
         ({"start_motion": "fast"}, "start_motion"),
         ({"start_motion": "12"}, "start_motion"),

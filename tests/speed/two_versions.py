@@ -90,11 +90,21 @@ def measured(what: str, asked: argparse.Namespace) -> Floats:
     return rows
 
 
+def _checkout(text: str) -> Path:
+    """The folder of a checkout."""
+    folder = Path(text).resolve()
+    if not (folder / "planners").is_dir():
+        raise argparse.ArgumentTypeError(
+            f"{text} holds no checkout: there is no folder {folder / 'planners'}"
+        )
+    return folder
+
+
 def main() -> None:
     """Read the options and print a row for each thing that is asked."""
     parser = argparse.ArgumentParser(prog="python -m tests.speed.two_versions")
-    parser.add_argument("old", type=Path)
-    parser.add_argument("new", type=Path)
+    parser.add_argument("old", type=_checkout)
+    parser.add_argument("new", type=_checkout)
     parser.add_argument("--asked", nargs="+", default=list(ASKED))
     parser.add_argument("--questions", type=int, default=60)
     parser.add_argument("--seed", type=int, default=92)
