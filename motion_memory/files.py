@@ -92,7 +92,7 @@ def read_worlds(
             a vehicle from a file.
         StorageError: Nothing can be read, the resolution is out of its range, or no world that is there can
             be used.
-        RunError: SciPy or shapely is not installed.
+        RunError: SciPy is not installed.
     """
     try:
         from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy

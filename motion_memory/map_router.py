@@ -125,8 +125,8 @@ class MapRouter:
             stops = stops_over(self._world, asked, self._vehicle, scale, goal_radius, tolerance, hitches)
         except ValueError as error:
             raise UsageError(f"The {error}.") from None
-        for_poses = {"goal_tolerance": tolerance, "goal_hitches": hitches}
-        check_options(stops, for_poses, {"goal_radius": goal_radius})
+        for_poses = {"goal_tolerance": tolerance is not None, "goal_hitches": len(hitches) > 0}
+        check_options(stops, for_poses, {"goal_radius": goal_radius is not None})
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
         self._solver.seconds.clear()

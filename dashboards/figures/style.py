@@ -36,6 +36,8 @@ _NOTE_LETTERS_AN_INCH: Final = 16.5  # at _NOTE_SIZE, with room to spare
 
 # Identifiers in an SVG are drawn from this instead of the clock: the same rows give the same file.
 matplotlib.rcParams["svg.hashsalt"] = "motion-memory"
+# A figure without a layout of its own has none, whatever the user's settings are.
+matplotlib.rcParams.update({"figure.autolayout": False, "figure.constrained_layout.use": False})
 
 
 def new_figure(width: float, height: float, title: str, note: str = "") -> Figure:
@@ -174,7 +176,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     Returns both paths. Raises StorageError if there is no room or no permission to write.
     """
     figure.draw_without_rendering()
-    figure.set_layout_engine(None)  # it was applied just now; that takes longer than drawing
+    # it was applied just now; that takes longer than drawing, and with any engine saving draws twice
+    figure.set_layout_engine(None)
     paths = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = folder / f"{name}.{kind}"

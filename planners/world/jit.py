@@ -111,7 +111,7 @@ class _KernelCache(FunctionCache):
 class _Flags(Flags):
     """Numba's flags, compared quickly: it does so for each operation, to find what was typed before.
 
-    Its own ask a property for each of their options, which takes a twentieth of the time of compiling.
+    Numba's own ask a property for each option, which takes a twentieth of the time of compiling.
     """
 
     __slots__ = ()
@@ -128,7 +128,7 @@ _FLAGS_HASH = hash(Flags())  # of the names of the options alone, so it is the s
 
 
 class _KernelCompiler(Compiler):
-    """Compiles a kernel."""
+    """Compiles a kernel, with flags that are compared quickly."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)

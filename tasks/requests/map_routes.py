@@ -114,23 +114,23 @@ def stops_over(
 
 
 def check_options(
-    stops: Sequence[Stop], for_poses: Mapping[str, object], for_places: Mapping[str, object]
+    stops: Sequence[Stop], for_poses: Mapping[str, bool], for_places: Mapping[str, bool]
 ) -> None:
     """Raise UsageError if an option is given that no goal takes.
 
     Args:
         stops: the goals.
-        for_poses: by their names, the options that poses take; None or empty: not given.
+        for_poses: whether each option that poses take is given, by its name.
         for_places: the same for places.
     """
     poses = sum(stop.is_pose for stop in stops)
-    for options, kind, takers in (
-        (for_poses, "poses (x,y,heading)", poses),
-        (for_places, "places (x,y)", len(stops) - poses),
+    for options, kind, form, takers in (
+        (for_poses, "poses", "x,y,heading", poses),
+        (for_places, "places", "x,y", len(stops) - poses),
     ):
-        for name, given in options.items():
-            if takers == 0 and given is not None and given != ():
-                raise UsageError(f"{name} is for {kind}, and no goal is one: leave it out.")
+        for name, is_given in options.items():
+            if is_given and takers == 0:
+                raise UsageError(f"{name} is for {kind}: give a goal of {form}, or leave it out.")
 
 
 def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> tuple[float, ...]:

@@ -87,8 +87,8 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
         raise UsageError(f"--goal-hitch: {error}.") from None
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
-    for_poses = {"--goal-tolerance": request.goal_tolerance, "--goal-hitch": hitches}
-    check_options(stops, for_poses, {"--goal-radius": request.goal_radius})
+    for_poses = {"--goal-tolerance": tolerance is not None, "--goal-hitch": bool(hitches)}
+    check_options(stops, for_poses, {"--goal-radius": near is not None})
     return stops
 
 

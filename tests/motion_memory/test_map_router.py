@@ -105,8 +105,8 @@ def test_where_it_is_stuck_is_told(world: motion_memory.OccupancyMap, router: An
         ({"goal_tolerance": (0.1, -0.1)}, "goal_tolerance"),
         ({"goal_hitches": (0.1,)}, "hitch"),
         ({"goal_hitches": ("a",)}, "goal_hitches"),
-        ({"goal_tolerance": (0.1, 0.1)}, "goal_tolerance is for poses"),
-        ({"goals": [(60.0, 80.0, 0.0)], "goal_radius": 1.0}, "goal_radius is for places"),
+        ({"goal_tolerance": (0.1, 0.1)}, "^goal_tolerance is for poses"),
+        ({"goals": [(60.0, 80.0, 0.0)], "goal_radius": 1.0}, "^goal_radius is for places"),
         ({"start_motion": (1e3,)}, "speed"),
         ({"start_motion": "fast"}, "start_motion"),
         ({"start_motion": "12"}, "start_motion"),
@@ -164,3 +164,12 @@ def test_a_map_needs_nothing_that_a_robot_has_not() -> None:
     code = f"import motion_memory.map_router, sys; print([m for m in {NOT_FOR_ROBOTS} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("read", [motion_memory.read_map, motion_memory.read_worlds])
+def test_without_scipy_it_is_said_what_to_install(
+    read: Any, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "storage.worlds.importing", None)  # as an import without SciPy ends
+    with pytest.raises(motion_memory.RunError, match="pip install"):
+        read(file)

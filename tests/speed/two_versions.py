@@ -94,9 +94,7 @@ def _checkout(text: str) -> Path:
     """The folder of a checkout."""
     folder = Path(text).resolve()
     if not (folder / "planners").is_dir():
-        raise argparse.ArgumentTypeError(
-            f"{text} holds no checkout: there is no folder {folder / 'planners'}"
-        )
+        raise argparse.ArgumentTypeError(f"{text} holds no checkout: it has no folder planners")
     return folder
 
 

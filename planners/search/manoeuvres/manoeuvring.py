@@ -16,6 +16,7 @@ from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.levels import FINE, LEVELS, suited
 from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
+from planners.search.manoeuvres.narrow_ways import too_narrow
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
 from planners.search.manoeuvres.outward import TURN, begin_outward, grow_trees, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
@@ -65,6 +66,11 @@ def allocate_way_from_start(goes_on: bool) -> CostToGo:
     return allocate_cost_to_go()
 
 
+def allocate_way_around_narrow(number: int) -> CostToGo:
+    """Buffers of each search, which has a ``number``."""
+    return allocate_cost_to_go()
+
+
 def allocate_trees(state_size: int, number: int) -> tuple[PoseTree, PoseTree]:
     """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
     return allocate_pose_tree(state_size), allocate_pose_tree(state_size)
@@ -102,6 +108,7 @@ class Manoeuvring:
             speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
         go = query.workspace.buffers(allocate_way_from_start, len(self._before.controls) > 0)
+        self._occupied, self._window, self._go, self._number = occupied.copy(), window, go, 0
         fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
         table = seconds_to_pose(without_trailers(counting_time(vehicle)))
         known = table, no_endings(size), word_radius(vehicle), goal[:2]
@@ -151,6 +158,7 @@ class Manoeuvring:
     def _another(self, query: Query, number: int) -> Manoeuvring:
         """A search of another ``number`` than this one, which still has to begin, and does not mend."""
         other = copy.copy(self)
+        other._number = number
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
         other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
         other._kept, other._soon, other._may_loop, other._may_mend = [None] * KEPT, [], False, False
@@ -274,8 +282,20 @@ class Manoeuvring:
                 self._level, self._spent = self._level + 1, 0
                 if self._level == FINE:
                     self._before_fine = self.expansions
+                    self._close_narrow_ways()
                 self._begin()
         return False
+
+    def _close_narrow_ways(self) -> None:
+        """From now on the way to the start avoids what is narrower than the vehicle, if it can."""
+        if self.meets:
+            return  # it was not tried with trailers
+        workspace = self._query.workspace
+        go = workspace.buffers(allocate_way_around_narrow, self._number)
+        narrow = too_narrow(self._scene, self._window, self._vehicle, workspace)
+        x, y = self._query.problem.start[:2]
+        fill_cost_to_go(self._occupied | narrow, x, y, AROUND_START_M, self._window, go)
+        self._known = self._known._replace(go=go)
 
     def _loops(self, until: float) -> bool:
         """Turn round in a loop, once; whether that gave a drive."""
@@ -327,6 +347,7 @@ class Manoeuvring:
         return max(turns, metres_to_go(*pose[:2], known.go) / top)
 
     def _begin_at_coarsest(self) -> None:
+        self._known = self._known._replace(go=self._go)
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 from numba import TypingError
+from numba.core.compiler import Flags
 
 from planners.world.compiling import working_clock
-from planners.world.jit import KEPT_BESIDE, KernelFiles, forget_old_kernels, jit
+from planners.world.jit import KEPT_BESIDE, KernelFiles, _Flags, forget_old_kernels, jit
 
 OTHERS = """
 import numba, numpy as np
@@ -149,3 +150,13 @@ def test_compiling_leaves_the_garbage_collector_as_it_was(on: bool, collecting: 
     with pytest.raises(TypingError):
         jit(nonsense)(2.0)
     assert gc.isenabled() == on
+
+
+def test_flags_that_are_compared_quickly_equal_numbas() -> None:
+    numbas = Flags()
+    numbas.nrt = True
+    ours = _Flags(numbas)
+    assert ours == numbas == ours.copy()
+    assert hash(ours) == hash(numbas) == hash(Flags())
+    assert ours != Flags()
+    assert ours.copy().values() == numbas.values()
