@@ -7,14 +7,17 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.manoeuvres.narrow_ways import too_narrow
-from planners.search.query import Limits
+from planners.search.query import Limits, Query
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
 from planners.world.geometry.collision import scene_of
-from planners.world.geometry.occupancy import GRID, window_of
+from planners.world.geometry.occupancy import GRID, drawing_of, window_of
+from planners.world.goal import goal_of
 from planners.world.problem import Problem
+from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 from storage.vehicles.vehicle_files import said_vehicle
@@ -22,6 +25,8 @@ from tests.planners.world.strategies import seeds
 from tests.worlds import box, problem_of, strewn
 
 WORKSPACE = Workspace()
+ROBOT = said_vehicle("docs/vehicles/turtlebot.yaml")
+LOT, _ = to_canonical(family("lot", "standard", ROBOT).draw(91, 15))  # a gap behind the slot is too narrow
 SHARES = np.linspace(0.05, 0.95, 3)  # of a cell, where it is looked at
 
 
@@ -58,10 +63,20 @@ def test_a_gap_is_closed_to_who_is_wider(gap: float) -> None:
         assert not within.all()
 
 
+def test_what_one_search_closes_stays_open_to_others() -> None:
+    query = Query(LOT, generator(1), scene_of(LOT), Workspace(), vehicle=ROBOT)
+    search = Manoeuvring(query, goal_of(LOT, ROBOT), drawing_of(LOT).occupied)
+    at_first = search._known.go.costs.copy()
+    search._close_narrow_ways()
+    closed = search._known.go.costs.copy()
+    slimmer = search.of_slimmer(query, 0.2)
+    assert np.array_equal(slimmer._known.go.costs, at_first)
+    slimmer._close_narrow_ways()
+    assert np.array_equal(search._known.go.costs, closed)
+    assert not np.array_equal(slimmer._known.go.costs, closed)
+
+
 def test_a_gap_too_narrow_for_the_robot_does_not_hold_the_search_up() -> None:
-    robot = said_vehicle("docs/vehicles/turtlebot.yaml")
-    lot, _ = to_canonical(family("lot", "standard", robot).draw(91, 15))
-    found = solve(
-        lot, "lattice", vehicle=robot, limits=Limits(expansions=30_000)
-    )  # before, 60,000 were not enough
+    limits = Limits(expansions=30_000)  # before, 60,000 were not enough
+    found = solve(LOT, "lattice", vehicle=ROBOT, limits=limits)
     assert found.plan is not None
