@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from motion_memory.extras import may_lack_scipy
 from planners.maps.occupancy_map import OccupancyMap
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
@@ -13,7 +14,6 @@ from storage.exchange import problems as problem_files
 from storage.fields import number_of
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 from tasks.settings.checks import check_known, check_path, check_seed, check_whole, checked_vehicle
-from tasks.settings.errors import RunError
 
 
 def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Problem]:
@@ -53,11 +53,9 @@ def read_map(
         StorageError: The file is missing or unreadable, or the resolution is out of its range.
         RunError: SciPy is not installed.
     """
-    try:
-        from storage.worlds.importing import ImportSettings, load_map  # late, as below
+    with may_lack_scipy("Maps"):
+        from storage.worlds.importing import ImportSettings, load_map
         from tasks.requests.route_request import map_source
-    except ModuleNotFoundError as error:
-        raise RunError(f"Maps need {error.name}: pip install 'motion-memory[optimise]'.") from None
     check_path("path", path)
     check_known("unknown", [unknown], ("free", "occupied"))
     source = map_source(Path(path), None, "read_map")
@@ -94,11 +92,9 @@ def read_worlds(
             be used.
         RunError: SciPy is not installed.
     """
-    try:
-        from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
+    with may_lack_scipy("Worlds"):
+        from storage.worlds.importing import ImportSettings, import_part
         from storage.worlds.sources import source_at
-    except ModuleNotFoundError as error:
-        raise RunError(f"Worlds need {error.name}: pip install 'motion-memory[optimise]'.") from None
     check_path("path", path)
     if count is not None:
         check_whole("count", count)

@@ -126,7 +126,7 @@ class MapRouter:
         except ValueError as error:
             raise UsageError(f"The {error}.") from None
         for_poses = {"goal_tolerance": tolerance is not None, "goal_hitches": len(hitches) > 0}
-        check_options(stops, for_poses, {"goal_radius": goal_radius is not None})
+        check_options(stops, for_poses, {"goal_radius": goal_radius is not None}, "a goal")
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
         self._solver.seconds.clear()

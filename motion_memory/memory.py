@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from motion_memory.array_problems import problem_of_arrays
+from motion_memory.extras import may_lack_scipy
 from motion_memory.plain import plain
 from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary
@@ -28,7 +29,7 @@ from storage.exchange.problems import problem_of
 from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.settings.checks import check_times, is_whole
-from tasks.settings.errors import RunError, UsageError
+from tasks.settings.errors import UsageError
 
 if TYPE_CHECKING:
     from motion_memory.map_router import MapRouter
@@ -163,10 +164,8 @@ class Memory:
             ValueError: the map is none, or too wide, or the vehicle cannot drive backwards.
             RunError: SciPy is not installed.
         """
-        try:
-            from motion_memory.map_router import MapRouter  # late: not every robot has SciPy
-        except ModuleNotFoundError as error:
-            raise RunError(f"Routes need {error.name}: pip install 'motion-memory[optimise]'.") from None
+        with may_lack_scipy("Routes"):
+            from motion_memory.map_router import MapRouter
         assist = "fresh" if (self.stored, self.assist) == (None, "none") else self.assist
         workspace = Workspace()
 

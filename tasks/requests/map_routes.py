@@ -114,7 +114,7 @@ def stops_over(
 
 
 def check_options(
-    stops: Sequence[Stop], for_poses: Mapping[str, bool], for_places: Mapping[str, bool]
+    stops: Sequence[Stop], for_poses: Mapping[str, bool], for_places: Mapping[str, bool], goal: str
 ) -> None:
     """Raise UsageError if an option is given that no goal takes.
 
@@ -122,6 +122,7 @@ def check_options(
         stops: the goals.
         for_poses: whether each option that poses take is given, by its name.
         for_places: the same for places.
+        goal: how a goal is given, before its numbers.
     """
     poses = sum(stop.is_pose for stop in stops)
     for options, kind, form, takers in (
@@ -130,7 +131,7 @@ def check_options(
     ):
         for name, is_given in options.items():
             if is_given and takers == 0:
-                raise UsageError(f"{name} is for {kind}: give a goal of {form}, or leave it out.")
+                raise UsageError(f"{name} is for {kind}: give {goal} {form}, or leave it out.")
 
 
 def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> tuple[float, ...]:

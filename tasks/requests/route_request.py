@@ -88,7 +88,7 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
     for_poses = {"--goal-tolerance": tolerance is not None, "--goal-hitch": bool(hitches)}
-    check_options(stops, for_poses, {"--goal-radius": near is not None})
+    check_options(stops, for_poses, {"--goal-radius": near is not None}, "--to")
     return stops
 
 

@@ -66,11 +66,6 @@ def allocate_way_from_start(goes_on: bool) -> CostToGo:
     return allocate_cost_to_go()
 
 
-def allocate_way_around_narrow(number: int) -> CostToGo:
-    """Buffers of each search, which has a ``number``."""
-    return allocate_cost_to_go()
-
-
 def allocate_trees(state_size: int, number: int) -> tuple[PoseTree, PoseTree]:
     """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
     return allocate_pose_tree(state_size), allocate_pose_tree(state_size)
@@ -108,7 +103,7 @@ class Manoeuvring:
             speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
         go = query.workspace.buffers(allocate_way_from_start, len(self._before.controls) > 0)
-        self._occupied, self._window, self._go, self._number = occupied.copy(), window, go, 0
+        self._occupied, self._window, self._go = occupied.copy(), window, go
         fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
         table = seconds_to_pose(without_trailers(counting_time(vehicle)))
         known = table, no_endings(size), word_radius(vehicle), goal[:2]
@@ -158,7 +153,6 @@ class Manoeuvring:
     def _another(self, query: Query, number: int) -> Manoeuvring:
         """A search of another ``number`` than this one, which still has to begin, and does not mend."""
         other = copy.copy(self)
-        other._number = number
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
         other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
         other._kept, other._soon, other._may_loop, other._may_mend = [None] * KEPT, [], False, False
@@ -290,9 +284,10 @@ class Manoeuvring:
         """From now on the way to the start avoids what is narrower than the vehicle, if it can."""
         if self.meets:
             return  # it was not tried with trailers
-        workspace = self._query.workspace
-        go = workspace.buffers(allocate_way_around_narrow, self._number)
-        narrow = too_narrow(self._scene, self._window, self._vehicle, workspace)
+        go = (
+            allocate_cost_to_go()
+        )  # not the buffers of others: searches of slimmer bodies begin with all ways
+        narrow = too_narrow(self._scene, self._window, self._vehicle, self._query.workspace)
         x, y = self._query.problem.start[:2]
         fill_cost_to_go(self._occupied | narrow, x, y, AROUND_START_M, self._window, go)
         self._known = self._known._replace(go=go)

@@ -6,11 +6,9 @@ one looks at everything before it.
 
 from __future__ import annotations
 
-import numpy as np
-
 from planners.search.structures.unreachable import CLOSED, FINER, allocate_floor, close_cells
 from planners.world.geometry.collision import Scene
-from planners.world.geometry.occupancy import GRID, Bits, Window
+from planners.world.geometry.occupancy import GRID, Bits, Window, bits_of
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 
@@ -33,5 +31,4 @@ def too_narrow(scene: Scene, window: Window, vehicle: Vehicle, workspace: Worksp
     floor = workspace.buffers(allocate_floor)
     close_cells(scene, window.left, window.bottom, window.cell_m / FINER, 0.5 * vehicle.width, floor)
     closed = (floor.cells == CLOSED).reshape(GRID, FINER, GRID, FINER).all(axis=(1, 3))
-    bits: Bits = np.bitwise_or.reduce(closed.astype(np.uint64) << np.arange(GRID, dtype=np.uint64), axis=1)
-    return bits
+    return bits_of(closed)

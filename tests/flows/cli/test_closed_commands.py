@@ -115,7 +115,6 @@ def test_an_mlflow_that_cannot_be_used_is_told_first_and_without_its_secret(
     assert_nowhere_in(data)
 
 
-@pytest.mark.slow  # two servers and three workers
 @pytest.mark.timeout(600)
 def test_a_killed_solve_goes_on_with_two_workers_to_the_same_rows(place: Path) -> None:
     problems, out = place / "many.jsonl", place / "solved" / "rows.parquet"

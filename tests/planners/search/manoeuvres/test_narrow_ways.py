@@ -14,7 +14,7 @@ from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
 from planners.world.geometry.collision import scene_of
-from planners.world.geometry.occupancy import GRID, drawing_of, window_of
+from planners.world.geometry.occupancy import GRID, drawing_of, grid_of, window_of
 from planners.world.goal import goal_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
@@ -32,8 +32,7 @@ SHARES = np.linspace(0.05, 0.95, 3)  # of a cell, where it is looked at
 
 def narrow_cells(problem: Problem, vehicle: Vehicle) -> np.ndarray:
     """Whether each cell ``[rows, columns]`` of the problem's window is too narrow."""
-    bits = too_narrow(scene_of(problem), window_of(problem), vehicle, WORKSPACE)
-    return (bits[:, None] >> np.arange(GRID, dtype=np.uint64) & np.uint64(1)).astype(bool)
+    return grid_of(too_narrow(scene_of(problem), window_of(problem), vehicle, WORKSPACE)).astype(bool)
 
 
 @given(seed=seeds, width=st.floats(0.2, 4.0))
