@@ -82,7 +82,7 @@ def gather(
     Args:
         sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
             and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
-            problems: these are the questions.
+            problems: these are the questions. Data folders: what solve and plan have learned there.
         out: Folder of the library, a new one.
         plans: How many questions to have answered; where fewer can be, the library holds those.
         poses: Share of the drawn questions that ask for a pose, not for a place.
@@ -102,7 +102,7 @@ def gather(
     driver = settled_vehicle(vehicle, first_of_problems(sources))
     settings = import_settings(driver, seed, **asdict(reading))
     counts = task.gather(
-        sources, out, plans, poses, difficulty, settings, worker_count(workers), _gather_pieces
+        sources, out, plans, poses, difficulty, settings, worker_count(workers), gather_pieces
     )
     write(task.gathered_table(counts))
     write_files(library=out)
@@ -122,7 +122,8 @@ def gather(
     return SHORT if sum(each.answered for each in counts) < plans else 0
 
 
-def _gather_pieces(request: GatherRequest) -> list[Gathered]:
+def gather_pieces(request: GatherRequest) -> list[Gathered]:
+    """Gather in worker processes."""
     from flows.gather import gather as flow  # late: Prefect reads its environment when it is imported
 
     return flow(request)

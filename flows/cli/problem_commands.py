@@ -75,7 +75,7 @@ def plan(
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
-        learn: Data folder that remembers the plan if it is new, from rest, and to a place 50√2 m ahead.
+        learn: Data folder that remembers the plan if no memory had it.
         options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant
@@ -170,7 +170,7 @@ def solve(
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
         picture: Where to draw the first six problems and their plans, .png, .svg or .pdf; needs --plans.
-        learn: Data folder that remembers new plans, those from rest to a place 50√2 m ahead.
+        learn: Data folder that remembers the plans that no memory had.
         workers: Worker processes; default one for each core. A few problems are solved without.
         options: How the problems are solved.
     """
@@ -192,9 +192,7 @@ def _write_learned(data: Path | None) -> None:
     if data is None or has_gained(data):
         write_files(learned=data)
     else:
-        write(
-            "learned  nothing: only searched plans from rest to a place 50√2 m ahead; `gather` keeps others"
-        )
+        write("learned  nothing: no plan was searched anew")
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

@@ -31,6 +31,7 @@ OWNER_ONLY: Final = (
     0o700  # mode of a folder that is made here; to share it, create it beforehand or use chmod
 )
 MARK: Final = "motion-memory.json"
+QUESTIONS: Final = "questions"  # in a folder of what was gained on the job
 HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
 
 
@@ -73,6 +74,10 @@ class DataFolder:
         """The folder of experiences that a vehicle gained on the job (``gained_experiences.py``)."""
         return self.path / "learned" / checked_name(vehicle)
 
+    def gained_questions(self, vehicle: str) -> Path:
+        """The folder of general questions that a vehicle answered on the job, with their plans."""
+        return self.gained(vehicle) / QUESTIONS
+
     def gained_folders(self) -> list[Path]:
         """The folders of experiences that were gained on the job, one per vehicle."""
         return folders_in(self.path / "learned")
@@ -86,6 +91,11 @@ class DataFolder:
     def libraries(self) -> Path:
         """The folder of libraries of plans that the dashboard finds (``archives/libraries.py``)."""
         return self.path / "libraries"
+
+    @property
+    def judged_libraries(self) -> Path:
+        """The folder of the attempts by which libraries were judged."""
+        return self.path / "judged"
 
     def run(self, name: str) -> RunFolder:
         """The folder of a run. Raises StorageError unless the name is a plain word."""

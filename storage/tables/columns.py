@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -11,14 +12,17 @@ import numpy as np
 import pyarrow as pa
 
 from planners.world.arrays import Array
-from planners.world.problem import Obstacles, Problem
+from planners.world.problem import Arrival, Obstacles, Problem
 from storage.fields import scale_of, short, text_of
 
 Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
-    """``problems`` as the columns with which every table of whole problems begins."""
+    """``problems`` as the columns with which every table of whole problems begins.
+
+    How a vehicle moves at the start and is to arrive is in ``motion_columns``.
+    """
     return {
         "id": [problem.id for problem in problems],
         "class": [problem.class_name for problem in problems],
@@ -31,6 +35,40 @@ def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
         "piece_starts": list_column([problem.obstacles.piece_starts for problem in problems], np.int32),
         "obstacle_starts": list_column([problem.obstacles.obstacle_starts for problem in problems], np.int32),
     }
+
+
+def motion_columns(problems: Sequence[Problem]) -> dict[str, Any]:
+    """How the vehicle moves at the start of ``problems``, and how it is to arrive."""
+    arrivals = [None if problem.arrival is None else problem.arrival._asdict() for problem in problems]
+    return {"start_motion": [list(problem.start_motion) for problem in problems], "arrival": arrivals}
+
+
+def in_motion(problems: Sequence[Problem], table: pa.Table) -> list[Problem]:
+    """The ``problems`` of a table with its ``motion_columns``; as they are if an earlier version wrote it.
+
+    Raises TypeError or ValueError if a row is none.
+    """
+    if not {"start_motion", "arrival"} <= set(table.column_names):
+        return list(problems)
+    rows = zip(problems, table["start_motion"].to_pylist(), table["arrival"].to_pylist(), strict=True)
+    return [_in_motion(problem, tuple(motion or ()), arrival) for problem, motion, arrival in rows]
+
+
+def _in_motion(problem: Problem, motion: tuple[float, ...], fields: dict[str, Any] | None) -> Problem:
+    if not all(map(math.isfinite, motion)):
+        raise ValueError(f"the start of problem {short(problem.id)} is not one of numbers")
+    if fields is None:
+        return replace(problem, start_motion=motion)
+    lists = {name: tuple(fields[name]) for name in ("hitches", "hitch_tolerances")}
+    arrival = Arrival(**fields | lists)
+    numbers = (arrival.heading or 0.0, arrival.heading_tolerance, *arrival.hitches, *arrival.hitch_tolerances)
+    if (
+        not all(map(math.isfinite, numbers))
+        or math.isnan(arrival.least_speed)
+        or math.isnan(arrival.most_speed)
+    ):
+        raise ValueError(f"the arrival of problem {short(problem.id)} is not one of numbers")
+    return replace(problem, start_motion=motion, arrival=arrival)
 
 
 def problems_of(table: pa.Table) -> list[Problem]:

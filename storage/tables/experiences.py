@@ -16,9 +16,16 @@ from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from storage.errors import StorageError
 from storage.fields import parse_json, short
-from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
+from storage.tables.columns import (
+    in_motion,
+    list_column,
+    lists_of,
+    motion_columns,
+    problem_columns,
+    problems_of,
+)
 from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import metadata_of, read_table, sound, write_table
+from storage.tables.shards import SCHEMA_KEY, metadata_of, read_table, sound, write_table
 from storage.vehicles.definitions import definition_of
 from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
@@ -59,6 +66,7 @@ def write_experiences(
     plans = [experience.plan for experience in experiences]
     columns = {
         **problem_columns([experience.problem for experience in experiences]),
+        **motion_columns([experience.problem for experience in experiences]),
         **_plan_columns(plans),
         "planner": list(planners),
         "seed": list(seeds),
@@ -99,7 +107,7 @@ def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
     return [
         Experience(problem, _plan(problem, states, controls, dt, vehicle), vehicle)
         for problem, states, controls, dt in zip(
-            problems_of(table),
+            in_motion(problems_of(table), table),
             lists_of(table["states"]),
             lists_of(table["controls"]),
             table["dt"].to_pylist(),
@@ -155,7 +163,7 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
         raise StorageError(
             f"{path} would hold plans for several vehicles; run collect with a new data folder."
         )
-    merged = pa.concat_tables(tables)
+    merged = pa.concat_tables(tables, promote_options="default")
     if max(rows, default=-1) >= merged.num_rows:
         raise StorageError(f"{path} needs more than the {merged.num_rows} rows that exist; run collect.")
     write_table(path, merged.take(pa.array(rows, pa.int64())), key)
@@ -177,6 +185,11 @@ def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
         "controls": list_column([plan.controls for plan in plans], np.float64),
         "dt": [plan.dt for plan in plans],
     }
+
+
+def holds_experiences(path: Path) -> bool:
+    """Whether the file at ``path`` is one of experiences, and not one of problems."""
+    return path.suffix == ".parquet" and metadata_of(path).get(SCHEMA_KEY) == EXPERIENCES.metadata[SCHEMA_KEY]
 
 
 def vehicle_of_experiences(path: Path) -> Vehicle:

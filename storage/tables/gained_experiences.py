@@ -22,8 +22,9 @@ import pyarrow as pa
 from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import Vehicle
 from storage.errors import InUseError, StorageError
+from storage.places.data_folder import QUESTIONS
 from storage.places.files import locked
-from storage.places.mirror import files_in, remove
+from storage.places.mirror import files_in, is_there, remove
 from storage.tables.columns import lists_of
 from storage.tables.experiences import (
     SearchedExperience,
@@ -37,6 +38,7 @@ from storage.tables.shards import read_table, sound, write_table
 MOST: Final = 5_000  # experiences per class: five times the default number of candidates for a memory
 SHARDS: Final = 16  # if there are more, they are merged
 SNAPSHOTS: Final = "snapshots"
+NAMELESS: Final = "learned"  # how a snapshot begins that was taken without a name
 DIGITS: Final = 8  # of a snapshot's digest
 MERGE_SECONDS: Final = 60.0  # at most: merging what is kept takes some seconds
 READINGS: Final = 3  # attempts to read shards that others may merge
@@ -82,8 +84,15 @@ def gained_shards(folder: Path) -> list[Path]:
     return files_in(folder, "[!.]*.parquet")
 
 
-def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
+def all_gained_shards(folder: Path) -> list[Path]:
+    """The shards in the ``folder`` of a vehicle: of straight problems, and of general questions."""
+    return [*gained_shards(folder), *gained_shards(folder / QUESTIONS)]
+
+
+def take_snapshot(folder: Path, name: str | None, vehicle: Vehicle) -> str:
     """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
+
+    A name of None takes one snapshot of each content.
 
     Returns the full name of the snapshot: the name and a digest of the content. Raises StorageError if
     nothing has been learned yet, InUseError if other processes hold the folder for longer than merging takes.
@@ -91,12 +100,13 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     if not gained_shards(folder):
         raise StorageError(f"{folder} holds no learned problems; solve problems with --learn first.")
     with locked(folder / ".lock", str(folder), MERGE_SECONDS):
-        taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
+        taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet") if name else []
         if taken:
             return taken[0].stem
         _, table, digest = _kept(folder, vehicle)
-        snapshot = f"{name}-{digest[:DIGITS]}"
-        write_table(snapshot_path(folder, snapshot), table)
+        snapshot = f"{name or NAMELESS}-{digest[:DIGITS]}"
+        if not is_there(snapshot_path(folder, snapshot)):
+            write_table(snapshot_path(folder, snapshot), table)
         return snapshot
 
 
@@ -148,7 +158,8 @@ def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
     shards = gained_shards(folder)
     if not shards:
         return [], EXPERIENCES.empty_table(), ""
-    table = pa.concat_tables([read_experience_table(shard, vehicle) for shard in shards])
+    tables = [read_experience_table(shard, vehicle) for shard in shards]
+    table = pa.concat_tables(tables, promote_options="default")  # earlier versions had fewer columns
     plans = [
         states.tobytes() + controls.tobytes()
         for states, controls in zip(lists_of(table["states"]), lists_of(table["controls"]), strict=True)

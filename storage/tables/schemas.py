@@ -69,6 +69,17 @@ PROBLEMS: Final = _schema(
     ),  # lengths are those of the world outside here
 )
 
+_ARRIVAL: Final = pa.struct(  # ``planners.world.problem.Arrival``
+    [
+        ("heading", pa.float64()),  # rad; null: any
+        ("heading_tolerance", pa.float64()),  # rad
+        ("least_speed", pa.float64()),  # m/s
+        ("most_speed", pa.float64()),
+        ("hitches", pa.list_(pa.float64())),  # rad
+        ("hitch_tolerances", pa.list_(pa.float64())),  # rad
+    ]
+)
+
 EXPERIENCES: Final = _schema(
     "experiences/1",
     [
@@ -80,6 +91,8 @@ EXPERIENCES: Final = _schema(
         ("planner", pa.string()),
         ("seed", pa.int64()),
         ("planning_seconds", pa.float64()),
+        ("start_motion", pa.list_(pa.float64())),  # the start state behind the pose; empty or null: at rest
+        ("arrival", _ARRIVAL),  # null: any
     ],
 )
 

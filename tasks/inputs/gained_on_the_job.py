@@ -1,4 +1,4 @@
-"""Experiences gained on the job: new plans of `solve` and `plan`, kept for runs that ask for them."""
+"""Experiences gained on the job: new plans of `solve` and `plan`, kept for runs and libraries."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
+from storage.exchange.problems import fields_of
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place
 from storage.places.run_folder import checked_name
-from storage.tables.gained_experiences import add_gained, take_snapshot
+from storage.tables.gained_experiences import add_gained, snapshot_path, take_snapshot
 from storage.vehicles.vehicle_files import label_of, said_vehicle
+from tasks.fan_out.keys import digest_of
 from tasks.settings.run_settings import RunSettings
 
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
+DIGITS: Final = 8  # of a question's digest, in its id
 
 
 class Solved(NamedTuple):
@@ -29,10 +32,11 @@ class Solved(NamedTuple):
 
 
 def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
-    """Add the plans of canonical problems that no memory had to a data folder.
+    """Add the plans that no memory had to a data folder.
 
-    Only problems that begin straight ahead: with one plan of another heading in it, a memory could not rank
-    any by blocked cells.
+    Straight problems are kept for the memories of runs: from rest to a place 50√2 m straight ahead. With one
+    plan of another heading in it, such a memory could not rank any by blocked cells. All others are general
+    questions, kept for libraries; of these a repaired plan is a stored one that was moved, and nothing new.
 
     Args:
         data: the data folder.
@@ -42,24 +46,50 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     Returns:
         how many plans were added.
     """
-    new = [
-        (Experience(problem, attempt.plan, vehicle), attempt)
-        for problem, attempt in attempts
-        if attempt.plan is not None
-        and attempt.source in NEW
-        and is_canonical(problem)
-        and begins_straight(problem)
-    ]
-    if new:
-        add_gained(
-            open_data_folder(data).gained(label_of(vehicle)),
-            [experience for experience, _ in new],
-            planner=new[0][1].planner,
-            seeds=[attempt.seed for _, attempt in new],
-            planning_seconds=[attempt.planning_seconds for _, attempt in new],
-            vehicle=vehicle,
-        )
-    return len(new)
+    straight: list[tuple[Experience, Attempt]] = []
+    questions: list[tuple[Experience, Attempt]] = []
+    for problem, attempt in attempts:
+        if attempt.plan is None or attempt.source not in NEW:
+            continue
+        if is_canonical(problem) and begins_straight(problem):
+            straight.append((Experience(problem, attempt.plan, vehicle), attempt))
+        elif attempt.source == "searched":
+            question = replace(problem, id=_own_id(problem, vehicle))
+            questions.append((Experience(question, attempt.plan, vehicle), attempt))
+    label = label_of(vehicle)
+    folder = open_data_folder(data)
+    for place, new in ((folder.gained(label), straight), (folder.gained_questions(label), questions)):
+        if new:
+            add_gained(
+                place,
+                [experience for experience, _ in new],
+                planner=new[0][1].planner,
+                seeds=[attempt.seed for _, attempt in new],
+                planning_seconds=[attempt.planning_seconds for _, attempt in new],
+                vehicle=vehicle,
+            )
+    return len(straight) + len(questions)
+
+
+def _own_id(question: Problem, vehicle: Vehicle) -> str:
+    """The id of a question and a digest of what it asks: robots often give each file the same names."""
+    asked = fields_of(replace(question, id=""), vehicle)
+    return f"{question.id}-{digest_of(asked)[:DIGITS]}"
+
+
+def snapshot_of_questions(data: Path | str, vehicle: Vehicle, name: str | None = None) -> Path:
+    """The file of a snapshot of the general questions that a vehicle answered on the job.
+
+    Args:
+        data: the data folder.
+        vehicle: who drives.
+        name: name of the snapshot, which is taken when the name is first used; None takes what there is now.
+
+    Raises:
+        StorageError: none was learned for the vehicle.
+    """
+    folder = open_data_folder(data).gained_questions(label_of(vehicle))
+    return snapshot_path(folder, take_snapshot(folder, name, vehicle))
 
 
 def has_gained(data: Path) -> bool:

@@ -34,7 +34,7 @@ from tasks.requests.part_folder import (
     remove_parts,
     unfinished,
 )
-from tasks.requests.question_sources import is_drawn
+from tasks.requests.question_sources import Asked, is_drawn, settled_source, shown_name
 from tasks.settings.checks import check_count, check_known, check_outputs
 from tasks.settings.errors import RunError, UsageError
 
@@ -73,11 +73,13 @@ def gather(
     settings: ImportSettings,
     workers: int = 1,
     flow: GatherFlow | None = None,
+    asked_of: Asked = "all",
 ) -> list[SourceCounts]:
     """Draw questions from each source in turn until enough are answered, and write the plans as a library.
 
-    A class, a family of manoeuvres and a map give any number of questions, a file of problems those that it
-    holds. Each plan is polished and judged; in a narrow place it is the quickest that a long search finds.
+    A class, a family of manoeuvres and a map give any number of questions, a file of problems and what was
+    learned on the job those that they hold.
+    Each plan is polished and judged; in a narrow place it is the quickest that a long search finds.
     Where the first drive to a pose stands still on its way, it is kept as well: other drives can join it
     there (``PlanLibrary.endings``), and polish melts such stops.
     The same sources and settings give the same bytes, whatever the number of workers. If the command is
@@ -85,7 +87,8 @@ def gather(
     library holds the plans that there are, and a warning says so.
 
     Args:
-        sources: names of classes and families; paths of maps, of worlds or of files of problems.
+        sources: names of classes and families; paths of maps, of worlds, of files of problems, or of data
+            folders, for what the vehicle has learned there.
         out: the folder to write, which must not be there.
         plans: how many questions to have answered.
         poses: the share of drawn questions that ask for a pose; the others ask for a place.
@@ -94,6 +97,7 @@ def gather(
         workers: number of worker processes.
         flow: gathers in worker processes. It is called once Prefect's environment is set, so it may import
             Prefect. None does everything in this process.
+        asked_of: which questions of the sources.
 
     Returns:
         what came of each source; of an earlier command that asked for the same, if ``out`` holds its library.
@@ -103,17 +107,13 @@ def gather(
         StorageError: a source cannot be read.
         RunError: no question could be answered.
     """
-    check_count("plans", plans)
-    if not 0.0 <= poses <= 1.0:
-        raise UsageError(f"--poses is {poses:g}: give a share from 0 to 1.")
-    check_known("difficulty", [difficulty], DIFFICULTIES)
-    if difficulty != "standard" and not any(map(is_drawn, sources)):
-        raise UsageError("--difficulty is of classes and families, and none is among the sources.")
+    check_asked_questions(plans, poses, difficulty, sources)
+    sources = [settled_source(each, settings.vehicle) for each in sources]
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
     for name in sources:
         if is_drawn(name) and Path(name).exists():
             _LOG.warning("%s is taken for the class or family; write ./%s for the folder here.", name, name)
-    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
+    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings, asked_of)
     asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
     if gathered is not None and gathered["asked"] == asked:
         load_library(out, settings.vehicle)  # StorageError if it is damaged
@@ -130,6 +130,16 @@ def gather(
             *(answered, sum(each.questions for each in counts), plans),
         )
     return counts
+
+
+def check_asked_questions(plans: int, poses: float, difficulty: str, sources: Sequence[str]) -> None:
+    """Check what is asked for; the arguments are those of ``gather``. Raises UsageError if one is wrong."""
+    check_count("plans", plans)
+    if not 0.0 <= poses <= 1.0:
+        raise UsageError(f"--poses is {poses:g}: give a share from 0 to 1.")
+    check_known("difficulty", [difficulty], DIFFICULTIES)
+    if difficulty != "standard" and not any(map(is_drawn, sources)):
+        raise UsageError("--difficulty is of classes and families, and none is among the sources.")
 
 
 def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
@@ -206,7 +216,7 @@ def _counted(request: GatherRequest, kept: Sequence[Answered], tried: Counter[in
         own = [each.variants for each in kept if each.source == number]
         driving_s = fmean(best.plan.duration_s for best, *_ in own) if own else None
         plans = sum(map(len, own))
-        counts.append(SourceCounts(Path(name).name, tried[number], len(own), plans, driving_s))
+        counts.append(SourceCounts(shown_name(name), tried[number], len(own), plans, driving_s))
     return counts
 
 

@@ -15,6 +15,7 @@ from planners.search.manoeuvres.endings import worth_storing
 from planners.search.query import POSE_EXPANSIONS, Limits
 from planners.solve import solve
 from planners.world.alignment import to_canonical
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
@@ -26,7 +27,7 @@ from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import digest_of, key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.part_folder import NumberedPiece, is_readable
-from tasks.requests.question_sources import QuestionSource, is_drawn, named_source, question_source
+from tasks.requests.question_sources import Asked, QuestionSource, is_drawn, named_source, question_source
 
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
@@ -46,6 +47,7 @@ class GatherRequest:
     poses: float  # the share of drawn questions that ask for a pose
     difficulty: str  # of classes and families
     settings: ImportSettings
+    asked_of: Asked = "all"  # which questions of the sources
 
     @functools.cached_property
     def asked(self) -> str:
@@ -53,7 +55,7 @@ class GatherRequest:
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
         contents = ["" if is_drawn(name) else named_source(name).digest() for name in self.sources]
-        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents)
+        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents, self.asked_of)
 
     @functools.cached_property
     def digest(self) -> str:
@@ -84,12 +86,13 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     sources, vehicle, workspace = read_sources(request), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
     for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
-        drawn = _question(sources, number)
+        source, own = sources[number % len(sources)], number // len(sources)
+        drawn = source.draw(own) if own < source.most else None
         if drawn is None:
             continue
         question = to_canonical(drawn)[0]
         asked.append(number)
-        plans = stored_variants(question, vehicle, request.settings.seed, workspace)
+        plans = stored_variants(question, vehicle, request.settings.seed, workspace, source.known(own))
         rows += [number] * len(plans)
         kept += [Experience(question, plan, vehicle) for plan in plans]
     write_experiences(
@@ -155,30 +158,37 @@ def read_sources(request: GatherRequest) -> list[QuestionSource]:
 
 @functools.lru_cache(maxsize=1)
 def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
-    how = (request.plans, request.poses, request.difficulty, request.settings)
+    how = (request.plans, request.poses, request.difficulty, request.settings, request.asked_of)
     return [question_source(name, *how) for name in request.sources]
 
 
-def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:
-    source, own = sources[number % len(sources)], number // len(sources)
-    return source.draw(own) if own < source.most else None
-
-
-def stored_variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
+def stored_variants(
+    question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace, known: Plan | None = None
+) -> list[Plan]:
     """What a library keeps for a question in its own frame: nothing if it is not solved, else a judged plan.
 
     With it goes the first drive to a pose if it has stops, at which others can join it.
+
+    Args:
+        question: the question.
+        vehicle: who drives.
+        seed: of the search.
+        workspace: the buffers of this thread.
+        known: a plan that answers the question already. It is kept where nothing better is found.
     """
     ask = partial(solve, question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
     found = ask(polished=False).plan
     if found is None:
-        return []
-    if question.arrival is None:
+        variants = [] if known is None else [known]
+    elif question.arrival is None:
         best = polish(question, found, vehicle, scene_of(question), workspace, margin_m=MARGIN_M).plan
+        variants = worth_storing(found, best, vehicle)
     else:  # it may be in a tight slot: no margin
         further = 0 if trailers_of(vehicle) else EFFORT.further  # with trailers an expansion takes longer
         best = ask(limits=replace(EFFORT, further=further)).plan
-    variants = worth_storing(found, best, vehicle)
+        if known is not None and (best is None or cost_of(known, vehicle) < cost_of(best, vehicle)):
+            best = known
+        variants = worth_storing(found, best, vehicle)
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)
     return variants

@@ -34,7 +34,7 @@ from storage.places.mirror import folders_in, is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences, vehicle_of_experiences
-from storage.tables.gained_experiences import gained_shards
+from storage.tables.gained_experiences import all_gained_shards
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
 from storage.vehicles.vehicle_files import said_vehicle
@@ -73,7 +73,9 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     data = open_data_folder(folder)
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
     for gained in data.gained_folders():
-        checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in gained_shards(gained)]
+        checks += [
+            partial(_experiences, path, VEHICLES.get(gained.name)) for path in all_gained_shards(gained)
+        ]
     checks += [
         partial(_library, path)
         for path in ([] if data.is_remote else folders_in(data.libraries))  # there they are no folders

@@ -29,7 +29,7 @@ from dashboards.web.parameters import Parameters, link
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
 from storage.tables.configurations import configurations_in
-from storage.tables.gained_experiences import gained_shards
+from storage.tables.gained_experiences import all_gained_shards
 from storage.tables.recalls import read_recalls
 from storage.tables.watched import read_watched
 
@@ -258,7 +258,7 @@ def _learned(data: DataReader) -> Iterator[dict[str, Any]]:
     """What was learned from solving: files and the newest change, by vehicle."""
     for folder in data.folder.gained_folders():
         times = []
-        for shard in gained_shards(folder):
+        for shard in all_gained_shards(folder):
             with suppress(FileNotFoundError):  # it has just been merged
                 times.append(shard.stat().st_mtime)
         if times:

@@ -12,13 +12,14 @@ from planners.memory.plans.experience import Experience
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
-from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import CAR
+from planners.world.problem import Arrival, Problem
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
+from storage.exchange.problems import fields_of
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
-from tasks.inputs.gained_on_the_job import Solved, remember, with_gained
+from tasks.inputs.gained_on_the_job import Solved, remember, snapshot_of_questions, with_gained
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import VARIANTS, candidates_of
@@ -44,6 +45,10 @@ def solved() -> list[Solved]:
 def _candidates(data: Path, settings: RunSettings) -> list[Experience]:
     run = run_folder(str(data), settings)
     return [each for path in run.shards("learned", "curves") for each in read_experiences(path)]
+
+
+def _questions(data: Path) -> list[Experience]:
+    return read_experiences(snapshot_of_questions(data, CAR))
 
 
 def test_what_was_learned_is_chosen_among(tmp_path: Path, solved: list[Solved]) -> None:
@@ -98,12 +103,54 @@ def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, sol
     assert {each.problem.id for each in _candidates(tmp_path, settings)} == {solved[0].problem.id}
 
 
-def test_only_what_begins_straight_ahead_is_learned(tmp_path: Path, solved: list[Solved]) -> None:
+def test_runs_learn_from_what_begins_straight_ahead_and_libraries_from_the_rest(
+    tmp_path: Path, solved: list[Solved]
+) -> None:
     turned = [
         _solved(replace(problem, start=(*problem.start[:2], problem.start[2] + 1e-3)))
         for problem, _ in solved[:2]
     ]
-    assert remember(tmp_path, [*turned, solved[2]], CAR) == 1
+    moved = Solved(turned[0].problem, replace(turned[1].attempt, source="repaired"))  # of a memory
+    assert remember(tmp_path, [*turned, solved[2], moved], CAR) == 3
+    settings = with_gained(SETTINGS, tmp_path, "now")
+    collect(str(tmp_path), settings)
+    assert {each.problem.id for each in _candidates(tmp_path, settings)} == {solved[2].problem.id}
+    kept = _questions(tmp_path)
+    assert {tuple(each.problem.start) for each in kept} == {tuple(problem.start) for problem, _ in turned}
+    assert not any(fault for each in kept for fault in faults(each.problem, each.plan, CAR))
+
+
+@pytest.mark.parametrize("vehicle", [CAR, VEHICLES["car-1-trailer"]], ids=["car", "trailer"])
+def test_a_question_is_kept_as_it_was_asked(tmp_path: Path, vehicle: Vehicle) -> None:
+    given = problem_class("curves", "easy", vehicle).draw(12, 1)
+    trailers = len(trailers_of(vehicle))
+    arrivals = [
+        None,
+        Arrival(),
+        Arrival(0.5, 0.02, 0.0, 0.0, (0.1,) * trailers, (0.02,) * trailers),
+        Arrival(None, 0.0, -1.0, 2.0),
+    ]
+    motion = (1.5, 0.1, *(0.2,) * trailers)
+    attempt = replace(solve(given, "lattice", vehicle=vehicle), source="searched")
+    for number, arrival in enumerate(arrivals):
+        asked = replace(given, start=(0.0, 0.0, 0.3), start_motion=motion, arrival=arrival, scale=2.0)
+        data = tmp_path / str(number)
+        assert remember(data, [Solved(asked, attempt)], vehicle) == 1
+        (kept,) = read_experiences(snapshot_of_questions(data, vehicle), vehicle)
+        assert fields_of(replace(kept.problem, id=asked.id), vehicle) == fields_of(asked, vehicle)
+
+
+def test_questions_are_told_apart_by_what_they_ask_and_not_by_their_names(
+    tmp_path: Path, solved: list[Solved]
+) -> None:
+    monday, tuesday = (
+        Solved(replace(problem, id="job-1", start=(*problem.start[:2], 0.0)), attempt)
+        for problem, attempt in solved[:2]
+    )
+    for day in (monday, tuesday, monday):
+        remember(tmp_path, [day], CAR)
+    assert len(_questions(tmp_path)) == 2
+    assert all(each.problem.id.startswith("job-1") for each in _questions(tmp_path))
 
 
 def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) -> None:

@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from flows.cli.main import call
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
-from planners.world.vehicles.vehicle import VEHICLES
+from planners.world.vehicles.vehicle import CAR, VEHICLES
+from planners.world.workspace import Workspace
 from storage.archives.libraries import load_library
 from storage.errors import StorageError
 from storage.exchange.problems import write_problems
@@ -87,6 +89,55 @@ def test_what_is_stored_for_a_pose_is_quicker_than_what_is_answered_at_once(tmp_
     assert len(at_once) == len(asked)
     assert sum(stored) < sum(at_once)
     assert all(kept < soon + 0.15 for kept, soon in zip(stored, at_once, strict=True))
+
+
+def test_what_was_learned_at_work_is_gathered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = [family("perpendicular").draw(11, number) for number in (15, 16)]
+    write_problems(Path("today.jsonl"), asked)
+    gathering = [
+        "gather",
+        "data",
+        "--plans",
+        "2",
+        "--workers",
+        "1",
+        "--out",
+        "data/libraries/slots",
+        "--json",
+    ]
+    solving = ["solve", "today.jsonl", "--planner", "lattice", "--learn", "data", "--plans", "plans"]
+    assert call([*solving, "--out", "first.parquet", "--workers", "1"]) == 0
+    driven = [json.loads(file.read_text())["duration_s"] for file in sorted(Path("plans").iterdir())]
+    capsys.readouterr()
+    assert call([*gathering[:-2], "elsewhere", "--vehicle", "car-1-trailer"]) == 1  # others learned nothing
+    assert capsys.readouterr().err.count("\n") == 1
+    assert call(gathering) == 0
+    (table,) = json.loads(capsys.readouterr().out)["tables"]
+    assert table["rows"][0]["answered"] == len(asked)
+    assert table["rows"][0]["driving_s"] <= sum(driven) / len(driven) + 1e-9  # never worse than at work
+    library = load_library(Path("data/libraries/slots"))
+    again = ["--memory", "data/libraries/slots", "--assist", "repair", "--out", "second.parquet", "--json"]
+    assert call([*solving[:-2], *again, "--workers", "1"]) == 0
+    answer = json.loads(capsys.readouterr().out)["answer"]
+    assert answer["outcomes"] == {"repaired": len(asked)}  # by their own drives, which are nothing new
+    assert call(gathering) == 0
+    assert load_library(Path("data/libraries/slots")).questions == library.questions
+    assert call(["verify", "data"]) == 0
+
+
+def test_a_question_that_the_search_does_not_answer_keeps_the_plan_that_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    question = to_canonical(family("perpendicular").draw(11, 15))[0]
+    attempt = solve(question, "lattice", seed=1)
+    assert attempt.plan is not None
+    monkeypatch.setattr(pieces, "solve", lambda *_, **__: replace(attempt, plan=None))
+    stored = pieces.stored_variants(question, CAR, 1, Workspace(), attempt.plan)
+    assert stored == [attempt.plan]
+    assert pieces.stored_variants(question, CAR, 1, Workspace()) == []
 
 
 def test_the_table_counts_the_questions_and_the_plans_of_each_source(
