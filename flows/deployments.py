@@ -24,7 +24,7 @@ from pydantic_core import MISSING
 
 from flows.benchmark import benchmark as benchmark_flow
 from flows.build_memory import build_memory as build_memory_flow
-from flows.cli import map_commands, problem_commands
+from flows.cli import library_commands, map_commands, problem_commands
 from flows.cli.run_options import Options
 from flows.cli.stage_commands import settings_of
 from flows.collect import collect as collect_flow
@@ -195,5 +195,6 @@ plan = _command(problem_commands.plan)
 solve = _command(problem_commands.solve)
 import_worlds = _command(map_commands.import_worlds)
 gather = _command(map_commands.gather)
+retrain_library = _command(library_commands.retrain_library)
 adapt = _command(map_commands.adapt)
 route = _command(map_commands.route)

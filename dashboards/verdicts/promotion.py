@@ -102,14 +102,14 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
     )
 
 
-def judgement_line(judged: Judgement) -> str:
-    """The figures by which it was ``judged``, in one line."""
+def judgement_line(judged: Judgement, who: str = "the challenger") -> str:
+    """The figures by which it was ``judged``, in one line about ``who``."""
     less = 100 * judged.columns["reduction"].mean()
     counts = Counter(judged.columns["verdict"])
     named = ", ".join(f"{counts[each]} {each}" for each in (SOONER, LATER, FEWER, OPEN) if counts[each])
     time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
     return (
-        f"the challenger is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
+        f"{who} is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
         f"{judged.problems:,} problems, and plans in {time}: {named}"
     )
 

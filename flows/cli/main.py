@@ -16,6 +16,7 @@ from cyclopts import App, CycloptsError, Group, Parameter, convert
 from cyclopts.config import Toml
 from cyclopts.exceptions import UnusedCliTokensError
 
+from flows.cli import library_commands as libraries
 from flows.cli import map_commands as maps
 from flows.cli import problem_commands as problems
 from flows.cli import result_commands as results
@@ -72,6 +73,7 @@ for command in (
     *(results.verify, results.export, results.compare, serving.dashboard),
     *(serving.serve_memory, serving.servers),
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),
+    *(libraries.retrain_library, libraries.serve_library),
 ):
     app.command(command)
 app.register_install_completion_command(add_to_startup=False)

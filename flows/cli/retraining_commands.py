@@ -61,11 +61,13 @@ def serve(
         approve: A challenger that is better waits for `motion-memory promote`.
         options: What a run is and where it happens.
     """
+    from tasks.champions.retraining_schedule import retraining_parameters
     from tasks.champions.retraining_schedule import serve as task
 
     settings = _settings(options)
     workers = worker_count(options.workers)
-    task(retrain_flow, ENTRYPOINT, settings, options.folder, every, cron, approve, workers, options.scheduler)
+    parameters = retraining_parameters(settings, approve, workers, options.scheduler)
+    task(retrain_flow, ENTRYPOINT, parameters, options.folder, every, cron)
 
 
 def retrain_flow() -> Flow[..., None]:

@@ -114,7 +114,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     attempts = judged(data, settings, memory)
     champion = run.champions.get(memory)
     judgement = None if champion is None else judge(*attempts)
-    verdict = _verdict(judgement, approve)
+    verdict = verdict_on(judgement, approve)
     load_memory(folder.memory(memory), said_vehicle(settings.vehicle))  # raises StorageError if damaged
     (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
@@ -136,11 +136,12 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     name = registered_name(memory, settings.vehicle_label)
     version = registry.register(name, run_id, model_id, key_of(settings.run_name, key), tags, markdown)
     log_judgement(data, settings, memory, verdict, judgement, markdown, attempts)
-    summary = _summary(version, champion, verdict, judgement)
+    summary = summary_of(version, champion, verdict, judgement)
     return JudgedVersion(memory, version, verdict, judgement, summary, markdown)
 
 
-def _verdict(judgement: Judgement | None, approve: bool) -> str:
+def verdict_on(judgement: Judgement | None, approve: bool) -> str:
+    """What becomes of a challenger; without a ``judgement`` it is the first champion."""
     if judgement is None:
         return FIRST
     if not judgement.passes:
@@ -148,7 +149,8 @@ def _verdict(judgement: Judgement | None, approve: bool) -> str:
     return AWAITING if approve else PROMOTED
 
 
-def _summary(version: Version, champion: Version | None, verdict: str, judgement: Judgement | None) -> str:
+def summary_of(version: Version, champion: Version | None, verdict: str, judgement: Judgement | None) -> str:
+    """What became of a version, in one line."""
     subject = f"{version.name} version {version.number}"
     if judgement is None or champion is None:
         return f"{subject} is the first champion; all its plans were checked"

@@ -65,7 +65,7 @@ def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Regi
         champion = registry.aliased(name)
         if champion is None:
             continue
-        judged = [version for version in registry.versions(name) if _is_judged(version, champion)]
+        judged = [version for version in registry.versions(name) if is_judged(version, champion)]
         champions[memory] = champion
         last_judged[memory] = judged[-1] if judged else champion
         seen_snapshots[memory] = {version.tag("learned") for version in judged}
@@ -124,7 +124,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
         RunError: the registry cannot be reached.
     """
     for memory in settings.memory_names:
-        _note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle_label)))
+        note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle_label)))
     pending = pending_retraining(folder, settings, registry)
     runs = []
     if pending.first_run is not None:
@@ -136,7 +136,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
     return runs
 
 
-def _note_verdict(registry: Registry, champion: Version | None) -> None:
+def note_verdict(registry: Registry, champion: Version | None) -> None:
     """Note the verdict on a champion whose promotion was interrupted before the verdict was noted."""
     if champion is not None and champion.tag("key") and not champion.tag("verdict"):
         registry.set_tags(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
@@ -150,7 +150,7 @@ def _challenger_run(
     champions = {
         name: pending.champions[name] for name in run_settings.memory_names if name in pending.champions
     }
-    number = _next_number(registry)
+    number = next_number(registry)
     run_settings = with_gained(run_settings, folder.path, f"retrain-{number:04d}")
     vehicle = said_vehicle(settings.vehicle)
     with scratch_folder() as scratch:
@@ -177,18 +177,16 @@ def _challenger_run(
     return RetrainingRun(run_settings, list(champions), champions)
 
 
-def _next_number(registry: Registry) -> int:
+def next_number(registry: Registry) -> int:
     """One more than that of the last retraining that was judged; an interrupted one keeps its number."""
     numbers = [0]
     for name in registry.names():
         champion = registry.aliased(name)
-        numbers += [
-            version.retraining for version in registry.versions(name) if _is_judged(version, champion)
-        ]
+        numbers += [version.retraining for version in registry.versions(name) if is_judged(version, champion)]
     return 1 + max(numbers)
 
 
-def _is_judged(version: Version, champion: Version | None) -> bool:
+def is_judged(version: Version, champion: Version | None) -> bool:
     """Whether a version has its verdict; a retraining that was interrupted leaves versions without."""
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 

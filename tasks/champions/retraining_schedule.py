@@ -9,7 +9,7 @@ import asyncio
 import json
 import logging
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -39,26 +39,20 @@ _LOG = logging.getLogger(__name__)
 def serve(
     flow: Callable[[], Flow[..., Any]],
     entrypoint: str,
-    settings: RunSettings,
+    parameters: Mapping[str, Any],
     data: Path,
     every: float | None,
     cron: str | None,
-    approve: bool,
-    workers: int,
-    scheduler: str | None = None,
 ) -> None:
     """Retrain on a schedule until Ctrl-C, one retraining at a time.
 
     Args:
         flow: imports and returns the flow that retrains; called once Prefect's environment is set.
         entrypoint: module and name from which the process of a retraining imports that flow.
-        settings: of each retraining.
+        parameters: of the flow, as JSON values, but for the data folder.
         data: the data folder.
         every: seconds from one retraining to the next; a day if neither this nor ``cron`` is given.
         cron: when to retrain, as a cron expression.
-        approve: whether better challengers wait for approval.
-        workers: worker processes of a retraining.
-        scheduler: address of a Dask scheduler to use instead of such processes.
 
     Raises:
         UsageError: both ``every`` and ``cron`` are given, or one of them is not a schedule.
@@ -67,15 +61,8 @@ def serve(
     schedule = _schedule(every, cron)
     with locked_folder(data) as folder:  # raises if it is in use; each retraining locks it again
         data_path = folder.path
-    parameters = {
-        "settings": as_parameter(settings),
-        "data": str(data_path),
-        "approve": approve,
-        "workers": workers,
-        "scheduler": scheduler,
-    }
     with local_server(data_path) as server:
-        deployment = _deployment(flow(), entrypoint, schedule, parameters)
+        deployment = _deployment(flow(), entrypoint, schedule, {**parameters, "data": str(data_path)})
         if server is not None:
             server.wait()
             _LOG.info(str(server))
@@ -92,6 +79,21 @@ def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
     if flow_run.deployment_id is not None:
         reason = " ".join(str(state.message).split())
         _LOG.error("motion-memory: %s", reason.partition("exception: ")[2] or reason)
+
+
+def retraining_parameters(
+    settings: RunSettings, approve: bool, workers: int, scheduler: str | None = None
+) -> dict[str, Any]:
+    """Parameters of the flow that retrains the memories of a run, but for the data folder.
+
+    Args:
+        settings: of each retraining.
+        approve: whether better challengers wait for approval.
+        workers: worker processes of a retraining.
+        scheduler: address of a Dask scheduler to use instead of such processes.
+    """
+    chosen = {"approve": approve, "workers": workers, "scheduler": scheduler}
+    return {"settings": as_parameter(settings), **chosen}
 
 
 def as_parameter(settings: RunSettings) -> dict[str, Any]:

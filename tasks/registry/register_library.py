@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from planners.world.vehicles.vehicle import Vehicle, name_of
-from storage.places.data_folder import open_data_folder
+from storage.places.data_folder import DataFolder, open_data_folder
 from storage.vehicles.vehicle_files import text_of
 from tasks.registry.champion_registry import Registry
 from tasks.registry.model_uris import memory_digest, set_mlflow_environment
@@ -16,6 +16,14 @@ from tasks.settings.environment import default_data
 from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
 
 STAGE: Final = "gather"
+
+
+class LoggedLibrary(NamedTuple):
+    """A library in MLflow."""
+
+    run_id: str  # the run that tells how it was gathered
+    model_id: str
+    digest: str  # of the library
 
 
 def register_library(
@@ -39,6 +47,23 @@ def register_library(
         RunError: MLflow does not answer.
     """
     data = open_data_folder(default_data())
+    logged = log_library(data, name, folder, vehicle, parameters, metrics)
+    tags = {"memory": name}
+    return Registry(data).register(name, *logged, tags, "A library of plans").uri
+
+
+def log_library(
+    data: DataFolder,
+    name: str,
+    folder: Path,
+    vehicle: Vehicle,
+    parameters: Mapping[str, Any],
+    metrics: Mapping[str, float],
+) -> LoggedLibrary:
+    """Log a library in MLflow, once; the arguments are those of ``register_library``, and a data folder.
+
+    Raises RunError if MLflow does not answer.
+    """
     set_environment(data.path)
     set_mlflow_environment()
     digest, log = memory_digest(folder), tracker(data.place)
@@ -50,5 +75,4 @@ def register_library(
             log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
             log.metrics(run_id, [metrics], model_id=model_id)
             log.mark_logged(run_id, digest, "memory")
-    run_id, model_id = log.logged_memory(title, name, digest)
-    return Registry(data).register(name, run_id, model_id, digest, {"memory": name}, "A library of plans").uri
+    return LoggedLibrary(*log.logged_memory(title, name, digest), digest)

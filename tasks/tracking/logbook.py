@@ -151,7 +151,7 @@ def log_judgement(
             return
         log.parameters(run_id, parameters_of(settings) | {"memory": memory})
         if judgement is not None:
-            log.metrics(run_id, [_judgement_metrics(judgement)])
+            log.metrics(run_id, [judgement_metrics(judgement)])
         with scratch_folder() as scratch:
             verdict_file = scratch / "verdict.md"
             verdict_file.write_text(markdown, encoding="utf-8")
@@ -162,7 +162,8 @@ def log_judgement(
         log.mark_logged(run_id, key)
 
 
-def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
+def judgement_metrics(judgement: Judgement) -> dict[str, float]:
+    """The numbers of a ``judgement``, each as a metric with its own name."""
     metrics = {name: float(getattr(judgement, name)) for name in ("sooner_s", "low_s", "high_s")}
     for row in judgement.columns.to_dict("records"):
         prefix = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"

@@ -33,7 +33,9 @@ ELSEWHERE: Final = {  # first words of commands that are only parsed (test_comma
     **dict.fromkeys(("run", "report", "sweep", "experience-curve", "verify", "compare", "train"), RUN),
     "export data": RUN,
     **dict.fromkeys(("retrain", "promote", "rollback"), "needs champions: tests/tasks/champions"),
-    **dict.fromkeys(("serve", "serve-memory", "servers", "dashboard"), SERVES),
+    "retrain-library": "needs minutes: tests/tasks/libraries",
+    "gather lot data": "needs what was learned: tests/tasks/requests/test_gather.py",
+    **dict.fromkeys(("serve", "serve-library", "serve-memory", "servers", "dashboard"), SERVES),
     "plan problem.json --vehicle jackal.yaml --memory": "needs a run of it: test_stages_of_vehicles.py",
 }
 TUTORIAL: Final = "tutorial.md"

@@ -141,8 +141,9 @@ def test_a_schedule_that_cannot_be_is_refused_before_anything_starts(
     every: float | None, cron: str | None, told: str, tmp_path: Path
 ) -> None:
     from flows.cli.retraining_commands import ENTRYPOINT, retrain_flow
-    from tasks.champions.retraining_schedule import serve
+    from tasks.champions.retraining_schedule import retraining_parameters, serve
 
+    parameters = retraining_parameters(SETTINGS, False, 1)
     with pytest.raises(UsageError, match=told):
-        serve(retrain_flow, ENTRYPOINT, SETTINGS, tmp_path / "data", every, cron, False, 1)
+        serve(retrain_flow, ENTRYPOINT, parameters, tmp_path / "data", every, cron)
     assert not (tmp_path / "data").exists()

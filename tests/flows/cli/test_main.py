@@ -19,7 +19,7 @@ COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "draw", "plan",
     "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
     "serve-memory", "servers",
-    "retrain", "serve", "promote", "rollback",
+    "retrain", "serve", "promote", "rollback", "retrain-library", "serve-library",
 )  # fmt: skip
 
 

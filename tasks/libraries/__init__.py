@@ -1,0 +1,1 @@
+"""Libraries of plans that are retrained: gathered anew with what was learned, and judged."""

@@ -1,0 +1,216 @@
+"""Judge a library: it, the champion and the planner alone answer the same held-back questions in turn."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import pandas as pd
+
+from dashboards.cells import NOTHING, CellTable, decimal, percent
+from dashboards.verdicts.promotion import Judgement, judge
+from planners.attempt import Attempt
+from planners.memory.library.plan_library import PlanLibrary
+from planners.search.query import usual_limits
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
+from storage.archives.libraries import load_library
+from storage.tables.attempts import join_attempts, read_attempts, write_attempts
+from storage.tables.shards import shard_is_done
+from tasks.attempts.attempt_rows import attempt_row
+from tasks.attempts.judged_attempts import check_attempt
+from tasks.attempts.side_by_side import in_turn
+from tasks.fan_out.keys import key_of
+from tasks.fan_out.stage import Job
+from tasks.requests.gather_pieces import COLLECTOR, GIVE_UP, GatherRequest, read_sources
+from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unfinished
+
+ASSIST: Final = "repair"  # the usual one with a memory
+TOP_K: Final = 5
+PIECE: Final = 10  # questions
+FEWEST: Final = 20  # questions of a class that are judged apart; of fewer an interval says nothing
+OTHERS, ALL = "other questions", "all questions"
+ALONE, CHAMPION, CHALLENGER = "", "champion", "challenger"  # who answers
+HEADINGS: Final = ("with", "planning ms", "driving s", "solved %", "from memory %")
+FIELDS: Final = ("side", "planning_ms", "driving_s", "solved_percent", "from_memory_percent")
+FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers
+
+
+class Side(NamedTuple):
+    """A library that answers questions."""
+
+    name: str  # ``CHAMPION`` or ``CHALLENGER``
+    folder: Path
+    digest: str  # of its content
+
+
+@dataclass(frozen=True)
+class Judging:
+    """Which questions are answered, by whom."""
+
+    out: Path  # the rows of all attempts, .parquet
+    questions: GatherRequest  # draws them; ``plans`` says how many
+    sides: tuple[Side, ...]
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """A digest of everything that the attempts depend on."""
+        return key_of(
+            "judge library", self.questions.asked, [(each.name, each.digest) for each in self.sides]
+        )
+
+
+class LibraryJudgement(NamedTuple):
+    """How a library does beside the planner alone, and beside the champion."""
+
+    alone: Judgement
+    champion: Judgement | None  # None if there is no champion
+    table: CellTable  # a row for each of them
+
+
+def judge_library(judging: Judging) -> LibraryJudgement | None:
+    """Have all questions answered by each side and by the planner alone, and judge the challenger.
+
+    If the command is killed, the same command has only the rest answered.
+
+    Args:
+        judging: the questions and the sides.
+
+    Returns:
+        the judgements; None if there is no question.
+
+    Raises:
+        PlanFaultError: the authority refuses an answer.
+        StorageError: a library or a source cannot be read.
+    """
+    count = len(_questions(judging.questions, judging.questions.digest))
+    if count == 0:
+        return None
+    if not shard_is_done(judging.out, judging.digest):
+        pieces = [JudgedPiece(judging, number) for number in range(-(-count // PIECE))]
+        with unfinished(judging.out):
+            do_here(JUDGE_LIBRARY, pieces)
+            join_attempts(judging.out, [piece.shard for piece in pieces], judging.digest)
+            remove_parts(judging.out)
+    return judged(read_attempts(judging.out, ("recalled",)))
+
+
+def judged(rows: pd.DataFrame) -> LibraryJudgement:
+    """Judge the challenger by the ``rows`` of all attempts.
+
+    All count as one way of asking, whatever a memory answers with, and what comes from a memory as a hit.
+    """
+    alike = rows.assign(
+        assist=ASSIST,
+        top_k=TOP_K,
+        recall="",
+        hit=rows["source"].isin(FROM_MEMORY),
+        problem_class=_panels(rows["problem_class"], rows["problem_id"]),
+    )
+    alone, champion, challenger = (alike[alike["run_id"] == side] for side in (ALONE, CHAMPION, CHALLENGER))
+    return LibraryJudgement(
+        judge(alone, challenger),
+        judge(champion, challenger) if len(champion) else None,
+        _table(alone, champion, challenger),
+    )
+
+
+def _table(*sides: pd.DataFrame) -> CellTable:
+    """What each side that answered did, over all questions."""
+    rows = [
+        [
+            side["run_id"].iloc[0] or "no memory",
+            decimal(1e3 * side["planning_seconds"].mean(), 1),
+            decimal(side["duration_s"].mean(), 2),
+            percent(side["solved"].mean()),
+            NOTHING if side["run_id"].iloc[0] == ALONE else percent(side["hit"].mean()),
+        ]
+        for side in sides
+        if len(side)
+    ]
+    title = f"{sides[-1]['problem_id'].nunique():,} held-back questions"
+    return CellTable(title, HEADINGS, [[row] for row in rows], "library-judgement", FIELDS)
+
+
+def _panels(classes: pd.Series[str], identities: pd.Series[str]) -> list[str]:
+    """What each row is judged with: its class, all small classes together, or, if those are few, all rows."""
+    asked = Counter(dict(zip(identities, classes, strict=True)).values())
+    few = {name for name, count in asked.items() if count < FEWEST}
+    if 0 < sum(asked[name] for name in few) < FEWEST:
+        return [ALL] * len(classes)
+    return [OTHERS if name in few else name for name in classes]
+
+
+@dataclass(frozen=True)
+class JudgedPiece(NumberedPiece[Judging]):
+    """Some of the questions, and who answers them."""
+
+    class_name: str = "questions"
+
+
+def judge_piece(piece: JudgedPiece) -> None:
+    """Have the questions of a piece answered, with cold caches, and write the attempts.
+
+    Raises PlanFaultError if the authority refuses a plan.
+    """
+    asked, vehicle = piece.request.questions, piece.request.questions.settings.vehicle
+    questions = _questions(asked, asked.digest)[piece.index * PIECE : (piece.index + 1) * PIECE]
+    sides = [(ALONE, None), *((each.name, _library(each, vehicle)) for each in piece.request.sides)]
+    workspace, seed = Workspace(), asked.settings.seed
+
+    def attempt(question: Problem, number: int) -> Attempt:
+        library = sides[number][1]
+        return solve(
+            *(question, COLLECTOR, "none" if library is None else ASSIST, TOP_K, library, seed),
+            usual_limits(question),
+            vehicle=vehicle,
+            workspace=workspace,
+        )
+
+    for number in range(len(sides)):  # anything made on first use exists before time counts
+        attempt(questions[-1], number)
+    attempts = in_turn(questions, len(sides), seed, attempt)
+    rows = []
+    for number, question in enumerate(questions):
+        accepted: set[bytes] = set()
+        for i, (side, library) in enumerate(sides):
+            checked = check_attempt(question, attempts[number, i], accepted, vehicle)
+            rows.append(attempt_row(checked, None if library is None else side, side, vehicle))
+    write_attempts(piece.shard, rows, key=piece.key)
+
+
+JUDGE_LIBRARY: Final = Job(
+    name="judge",
+    do=judge_piece,
+    output=lambda piece: piece.shard,
+    units=lambda piece: PIECE,
+    unit="questions",
+)
+
+
+@functools.lru_cache(maxsize=2)
+def _library(side: Side, vehicle: Vehicle) -> PlanLibrary:
+    return load_library(side.folder, vehicle)
+
+
+@functools.lru_cache(maxsize=1)
+def _questions(request: GatherRequest, _digest: str) -> Sequence[Problem]:
+    """The questions, in the canonical frame: as many as are wanted, or as there are."""
+    sources = read_sources(request)
+    most = min(GIVE_UP * request.plans, max(source.most for source in sources) * len(sources))
+    found: list[Problem] = []
+    number = 0
+    while len(found) < request.plans and number < most:
+        source, own = sources[number % len(sources)], number // len(sources)
+        question = source.draw(own) if own < source.most else None
+        if question is not None:
+            found.append(to_canonical(question)[0])
+        number += 1
+    return found

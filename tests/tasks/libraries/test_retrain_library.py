@@ -1,0 +1,209 @@
+"""Retraining a library: it grows by what was learned, is judged by what it never saw, and survives a kill."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flows.cli.main import call
+from planners.attempt import Attempt
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.classes.families import family
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.libraries import load_library
+from storage.places.data_folder import open_data_folder
+from storage.tables.attempts import read_attempts
+from storage.worlds.importing import ImportSettings
+from tasks.champions.promote import roll_back
+from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.libraries import judge_library as judging
+from tasks.libraries import retrain_library as task
+from tasks.libraries.judge_library import ALL, ALONE, CHALLENGER, CHAMPION, FEWEST, OTHERS, judged
+from tasks.libraries.retrain_library import LibraryRetraining, RetrainedLibrary, library_dry_run
+from tasks.registry.champion_registry import FIRST, PROMOTED, REFUSED, Registry, Version
+from tasks.requests.question_sources import is_held_back
+from tasks.requests.verify_folder import verify_folder
+from tasks.tracking import mlflow_runs
+from tests.prepared.mlflow_database import with_mlflow_database
+
+pytestmark = [
+    pytest.mark.timeout(600),
+    pytest.mark.filterwarnings(  # of MLflow's libraries among themselves
+        "ignore:.*type hint:UserWarning",
+        "ignore:Operation with range",
+        "ignore::DeprecationWarning",
+        "ignore::FutureWarning",
+        "ignore::ResourceWarning",
+    ),
+]
+ASKED: Final = LibraryRetraining("slots", ("perpendicular",), 3, 0.25, "standard", ImportSettings(), 4, False)
+
+
+@pytest.fixture
+def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    folder = tmp_path / "data"
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(folder))
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    monkeypatch.setattr(task, "publish_judgements", lambda *_: None)  # no Prefect to tell
+    with_mlflow_database(folder)
+    yield folder
+    mlflow_runs.tracker.cache_clear()
+
+
+def _learn(data: Path, seed: int, count: int) -> list[str]:
+    """Park on the job; the ids of what was learned."""
+    drawn = [to_canonical(family("parallel").draw(seed, index))[0] for index in range(count)]
+    remember(data, [Solved(each, solve(each, "lattice")) for each in drawn], CAR)
+    return [each.id for each in drawn]
+
+
+def _versions(data: Path) -> list[Version]:
+    return Registry(open_data_folder(data)).versions(ASKED.registered)
+
+
+def _champion(data: Path) -> int:
+    champion = Registry(open_data_folder(data)).aliased(ASKED.registered)
+    assert champion is not None
+    return champion.number
+
+
+def _retrain(data: Path, asked: LibraryRetraining = ASKED) -> RetrainedLibrary:
+    made = task.retrain_library(data, asked)
+    assert made is not None
+    return made
+
+
+def _timed(monkeypatch: pytest.MonkeyPatch, more_is_better: bool) -> None:
+    """Answers whose time follows from the number of plans: a clock would decide who is champion."""
+
+    def timed(*asked: Any, **named: Any) -> Attempt:
+        plans = 0 if asked[4] is None else len(asked[4].plans)
+        return replace(solve(*asked, **named), planning_seconds=1.0 / (1 + plans) if more_is_better else 1.0)
+
+    monkeypatch.setattr(judging, "solve", timed)
+
+
+def test_a_library_grows_by_what_was_learned_and_is_judged_by_what_it_never_saw(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _timed(monkeypatch, more_is_better=True)
+    first = _retrain(data)
+    assert (first.verdict, _champion(data)) == (FIRST, 1)
+    assert task.retrain_library(data, ASKED) is None  # nothing new
+    _learn(data, 5, 8)
+    before = sorted(data.rglob("*.parquet"))
+    assert "would be gathered" in library_dry_run(data, ASKED)
+    assert sorted(data.rglob("*.parquet")) == before
+
+    def die(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as killed:
+        killed.setattr(task, "settle", die)  # in the last moment
+        with pytest.raises(KeyboardInterrupt):
+            task.retrain_library(data, ASKED)
+    assert _champion(data) == 1
+    _learn(data, 6, 2)  # waits for the next time
+    second = _retrain(data)
+    assert (second.verdict, _champion(data), len(_versions(data))) == (PROMOTED, 2, 2)
+
+    old, new = load_library(first.folder), load_library(second.folder)
+    assert new.questions[: len(old.questions)] == old.questions
+    assert all(
+        np.array_equal(one.states, other.states) for one, other in zip(old.plans, new.plans, strict=False)
+    )
+    added = new.questions[len(old.questions) :]
+    assert added
+    assert all(each.startswith("parallel") for each in added)
+    rows = read_attempts(data / "judged" / f"{second.folder.name}.parquet")
+    assert set(rows["problem_id"]).isdisjoint(new.questions)
+    assert set(rows["run_id"]) == {ALONE, CHAMPION, CHALLENGER}
+    assert {name.split("-")[0] for name in rows["problem_id"]} == {"perpendicular", "parallel"}
+    assert rows["verified"].all()
+
+    assert [change.now for change in roll_back(data, "slots")] == [1]
+    third = _retrain(data)  # of what was learned meanwhile, and of what the first does not have
+    assert set(added) < set(load_library(third.folder).questions)
+    assert _versions(data)[2].tag("against") == "1"
+    verify_folder(data, 0.0, 1)  # raises where something is wrong
+
+
+def test_a_library_that_is_no_better_is_refused_and_not_judged_again(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _timed(monkeypatch, more_is_better=False)
+    _retrain(data)
+    more = ASKED._replace(plans=4)
+    assert "not asked for in this way" in library_dry_run(data, more)
+    second = _retrain(data, more)
+    assert (second.verdict, _champion(data)) == (REFUSED, 1)
+    for asked in (ASKED, more):
+        assert task.retrain_library(data, asked) is None
+
+
+@given(st.dictionaries(st.text("abc", min_size=1, max_size=2), st.integers(1, 50), min_size=1, max_size=6))
+def test_no_verdict_rests_on_a_few_questions_of_a_kind(asked: dict[str, int]) -> None:
+    names = [name for name, count in asked.items() for _ in range(count)]
+    rows = pd.concat(
+        pd.DataFrame(
+            {
+                "problem_id": range(len(names)), "problem_class": names, "run_id": side, "planner": "lattice",
+                "source": "searched", "solved": True, "planning_seconds": 0.1, "duration_s": 8.0,
+                "polished": True,
+            }
+        )
+        for side in (ALONE, CHAMPION, CHALLENGER)
+    )  # fmt: skip
+    judgement = judged(rows)
+    for each in (judgement.alone, judgement.champion):
+        assert each is not None
+        assert not each.passes  # all are equal
+        columns = each.columns
+        assert columns["problems"].sum() == len(names)
+        assert (columns["problems"] >= FEWEST).all() or list(columns["panel"]) == [ALL]
+        assert set(columns["panel"]) <= {*names, OTHERS, ALL}
+        for name, count in asked.items():
+            assert (name in set(columns["panel"])) <= (count >= FEWEST)
+
+
+def test_one_question_in_four_is_held_back() -> None:
+    held = [is_held_back(family("parallel").draw(3, index)) for index in range(400)]
+    assert 60 < sum(held) < 140
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["trap", "lot"], "trap is the name of a run's memory"),
+        (["combined", "lot"], "combined is the name of a run's memory"),
+        (["../lots", "lot"], "lots"),
+        (["lots", "lot", "--plans", "0"], "0 plans: give 1 or more."),
+        (["lots", "lot", "--test-problems", "0"], "0 test problems: give 1 or more."),
+        (["lots", "lot", "--poses", "2"], "--poses is 2"),
+        (["lots", "lot", "--vehicle", "tram"], "Unknown vehicle 'tram'"),
+        (["lots", "--difficulty", "hard"], "--difficulty is of classes and families"),
+    ],
+)
+@pytest.mark.parametrize("command", ["retrain-library", "serve-library"])
+def test_what_cannot_be_retrained_is_told_in_a_line_before_anything_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str, asked: list[str], told: str
+) -> None:
+    assert call([command, *asked, "--data", str(tmp_path / "data")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert told in error
+    assert not (tmp_path / "data").exists()
+
+
+def test_without_sources_and_without_what_was_learned_there_is_nothing_to_gather(data: Path) -> None:
+    with pytest.raises(task.UsageError, match="nothing was learned"):
+        task.retrain_library(data, ASKED._replace(sources=()))
