@@ -8,7 +8,8 @@ from prefect import flow
 
 from flows.gather import gather
 from tasks.champions.retraining_schedule import log_failure
-from tasks.libraries.retrain_library import RetrainedLibrary, library_retraining
+from tasks.libraries.pending_library import library_retraining
+from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.libraries.retrain_library import retrain_library as task
 from tasks.requests.import_worlds import Unknown, import_settings
 

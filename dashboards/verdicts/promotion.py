@@ -7,7 +7,7 @@ planning and driving. The challenger is promoted if
 1. it is sooner: the mean over all columns of the mean time that it saves has a 95 % interval (paired
    bootstrap over problems) above 0;
 2. it is later nowhere: no column has an interval, widened for their number (Bonferroni), that lies beyond
-   ``NOTICED_S`` on the wrong side;
+   what is noticed (``NOTICED_S``, or what the caller says) on the wrong side;
 3. it solves no fewer problems: not in all columns together, and in no column significantly fewer (exact sign
    test, corrected by Holm, 5 %).
 
@@ -59,13 +59,16 @@ class Judgement(NamedTuple):
     columns: pd.DataFrame  # a row a class, planner and configuration: the verdict and its figures
 
 
-def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Judgement:
+def judge(
+    champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0, noticed_s: float = NOTICED_S
+) -> Judgement:
     """Apply the rule to attempt rows of ``champion`` and ``challenger``, each with one memory.
 
     Args:
         champion: attempt rows of the champion.
         challenger: attempt rows of the challenger.
         seed: seed of the bootstrap.
+        noticed_s: seconds; being later by less in a column is no harm.
 
     Raises:
         ValueError: the rows are not of the same problems in the same configurations, or there are none.
@@ -86,7 +89,7 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
     _, widened = _ends(drawn, 1.0 - (1.0 - CONFIDENCE) / drawn.shape[1])
     columns = columns.assign(low_s=low, high_s=high, p_value=holm(columns["p_value"].to_numpy(float)))
     fewer = (columns["p_value"] < 1.0 - CONFIDENCE) & (columns["solved"] < columns["champion_solved"])
-    verdicts = np.select([fewer, widened < -NOTICED_S, low > 0.0], [FEWER, LATER, SOONER], OPEN)
+    verdicts = np.select([fewer, widened < -noticed_s, low > 0.0], [FEWER, LATER, SOONER], OPEN)
     columns = columns.assign(verdict=verdicts)
     whole = _ends(drawn.mean(1, keepdims=True), CONFIDENCE)
     ends = float(whole[0][0]), float(whole[1][0])

@@ -16,7 +16,7 @@ from flows.cli.terminal import SHORT, write, write_answer, write_files
 if TYPE_CHECKING:
     from prefect import Flow
 
-    from tasks.libraries.retrain_library import LibraryRetraining
+    from tasks.libraries.pending_library import LibraryRetraining
 
 ENTRYPOINT: Final = "flows.cli.scheduled.retrain_library"
 Flag = Annotated[bool, Parameter(negative=())]
@@ -81,7 +81,7 @@ def retrain_library(
 
     data = options.data or default_data()
     if dry_run:
-        from tasks.libraries.retrain_library import library_dry_run
+        from tasks.libraries.pending_library import library_dry_run
 
         write(library_dry_run(data, _asked(name, sources or [], options, reading)))
         return 0
@@ -149,7 +149,7 @@ def _parameters(
 
 
 def _asked(name: str, sources: list[str], options: LibraryOptions, reading: MapOptions) -> LibraryRetraining:
-    from tasks.libraries.retrain_library import library_retraining
+    from tasks.libraries.pending_library import library_retraining
     from tasks.requests.import_worlds import import_settings
 
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))

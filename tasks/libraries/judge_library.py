@@ -35,6 +35,7 @@ from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unf
 ASSIST: Final = "repair"  # the usual one with a memory
 TOP_K: Final = 5
 PIECE: Final = 10  # questions
+NOTICED_S: Final = 0.05  # more plans cost milliseconds to look through, where manoeuvres take seconds
 FEWEST: Final = 20  # questions of a class that are judged apart; of fewer an interval says nothing
 OTHERS, ALL = "other questions", "all questions"
 ALONE, CHAMPION, CHALLENGER = "", "champion", "challenger"  # who answers
@@ -116,8 +117,8 @@ def judged(rows: pd.DataFrame) -> LibraryJudgement:
     )
     alone, champion, challenger = (alike[alike["run_id"] == side] for side in (ALONE, CHAMPION, CHALLENGER))
     return LibraryJudgement(
-        judge(alone, challenger),
-        judge(champion, challenger) if len(champion) else None,
+        judge(alone, challenger, noticed_s=NOTICED_S),
+        judge(champion, challenger, noticed_s=NOTICED_S) if len(champion) else None,
         _table(alone, champion, challenger),
     )
 

@@ -28,10 +28,12 @@ from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.libraries import judge_library as judging
 from tasks.libraries import retrain_library as task
 from tasks.libraries.judge_library import ALL, ALONE, CHALLENGER, CHAMPION, FEWEST, OTHERS, judged
-from tasks.libraries.retrain_library import LibraryRetraining, RetrainedLibrary, library_dry_run
+from tasks.libraries.pending_library import LibraryRetraining, library_dry_run
+from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.registry.champion_registry import FIRST, PROMOTED, REFUSED, Registry, Version
 from tasks.requests.question_sources import is_held_back
 from tasks.requests.verify_folder import verify_folder
+from tasks.settings.errors import UsageError
 from tasks.tracking import mlflow_runs
 from tests.prepared.mlflow_database import with_mlflow_database
 
@@ -205,5 +207,5 @@ def test_what_cannot_be_retrained_is_told_in_a_line_before_anything_is_written(
 
 
 def test_without_sources_and_without_what_was_learned_there_is_nothing_to_gather(data: Path) -> None:
-    with pytest.raises(task.UsageError, match="nothing was learned"):
+    with pytest.raises(UsageError, match="nothing was learned"):
         task.retrain_library(data, ASKED._replace(sources=()))

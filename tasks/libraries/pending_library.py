@@ -1,0 +1,149 @@
+"""What retraining a library has to do: what is asked for, and what is new."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from planners.world.classes.problem_classes import CLASSES
+from storage.errors import StorageError
+from storage.places.data_folder import MARK, DataFolder
+from storage.places.mirror import fetch, is_remote, local_place
+from storage.places.run_folder import checked_name
+from storage.tables.gained_experiences import read_gained, snapshot_ids
+from storage.vehicles.vehicle_files import label_of
+from storage.worlds.importing import ImportSettings
+from tasks.champions.new_experience import is_judged, next_number
+from tasks.registry.champion_registry import Registry, Version
+from tasks.requests.gather import (
+    check_asked_questions,
+)
+from tasks.requests.gather_pieces import GatherRequest
+from tasks.requests.question_sources import is_drawn, is_held_back
+from tasks.settings.checks import check_count
+from tasks.settings.errors import UsageError
+from tasks.settings.run_settings import COMBINED
+from tasks.tracking.model_names import registered_name
+
+
+class LibraryRetraining(NamedTuple):
+    """Which library is retrained, and how."""
+
+    name: str
+    sources: tuple[str, ...]  # of questions, beside those that were learned
+    plans: int  # questions that a library answers
+    poses: float  # the share of drawn questions that ask for a pose
+    difficulty: str  # of classes and families
+    settings: ImportSettings
+    test_problems: int  # held-back questions that a library is judged by
+    approve: bool  # whether a better one waits for ``motion-memory promote``
+
+    @property
+    def registered(self) -> str:
+        """The name in MLflow's registry."""
+        return registered_name(self.name, label_of(self.settings.vehicle))
+
+    def recipe(self) -> str:
+        """A digest of everything that is asked for, but for what was learned."""
+        return self.request(Path(), self.sources).asked
+
+    def request(self, out: Path, sources: Sequence[str]) -> GatherRequest:
+        """What is gathered from some sources."""
+        return GatherRequest(
+            *(tuple(sources), out, self.plans, self.poses, self.difficulty, self.settings, "train")
+        )
+
+
+class PendingLibrary(NamedTuple):
+    """What a retraining would find to do now."""
+
+    champion: Version | None
+    number: int  # of the retraining
+    is_anew: bool  # whether everything is gathered, and not only what is new
+    is_due: bool
+    line: str  # why it is, or is not
+
+
+def library_retraining(
+    name: str,
+    sources: Sequence[str],
+    plans: int,
+    poses: float,
+    difficulty: str,
+    settings: ImportSettings,
+    test_problems: int,
+    approve: bool = False,
+) -> LibraryRetraining:
+    """Check what is asked for; paths become absolute. The arguments are those of ``LibraryRetraining``.
+
+    Raises UsageError if a name or a number is wrong.
+    """
+    try:
+        checked_name(name)
+    except StorageError as error:
+        raise UsageError(str(error)) from None
+    if name in (*CLASSES, COMBINED):
+        raise UsageError(f"{name} is the name of a run's memory: give the library another.")
+    check_count("test problems", test_problems)
+    check_asked_questions(plans, poses, difficulty, sources)
+    own = [each if is_drawn(each) or is_remote(each) else str(Path(each).absolute()) for each in sources]
+    return LibraryRetraining(*(name, tuple(own), plans, poses, difficulty, settings, test_problems, approve))
+
+
+def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Registry) -> PendingLibrary:
+    """Look up in the registry and the data folder whether there is something to do; write nothing.
+
+    Args:
+        folder: the data folder, which holds what was learned.
+        asked: which library, and how.
+        registry: the registry of the champions.
+
+    Raises:
+        RunError: the registry cannot be reached.
+        UsageError: there are no sources, and nothing was learned.
+    """
+    vehicle, number = asked.settings.vehicle, next_number(registry)
+    place = folder.gained_questions(label_of(vehicle))
+    learned = [each.experience.problem for each in read_gained(place, vehicle)]
+    champion = registry.aliased(asked.registered)
+    if champion is None:
+        if not asked.sources and not learned:
+            raise UsageError(
+                f"{asked.name} has no sources, and nothing was learned: name a class, a family of "
+                "manoeuvres, a map, worlds or a file of problems, or solve problems with --learn."
+            )
+        line = f"{asked.name}: no champion yet; {_counted(len(learned), 'learned question')}"
+        return PendingLibrary(None, number, True, True, line)
+    judged = [each for each in registry.versions(asked.registered) if is_judged(each, champion)]
+    seen = {identity for each in judged for identity in snapshot_ids(place, each.tag("learned"))}
+    new = sum(question.id not in seen and not is_held_back(question) for question in learned)
+    recipe, known = asked.recipe(), {each.tag("recipe") for each in (champion, *judged)}
+    line = f"{asked.name}: champion is version {champion.number}; "
+    line += f"{_counted(new, 'new question')} to learn from" if new else "nothing new was learned"
+    line += "" if recipe in known else ", and it was not asked for in this way before"
+    is_anew = recipe != champion.tag("recipe")
+    return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
+
+
+def library_dry_run(data: Path, asked: LibraryRetraining) -> str:
+    """Say in a line what retraining a library would find to do now, and write nothing.
+
+    Args:
+        data: the data folder, which may not be there yet.
+        asked: which library, and how.
+
+    Raises:
+        RunError: the registry cannot be reached.
+        UsageError: there is nothing to gather from.
+    """
+    path = local_place(data).expanduser().absolute()
+    if not fetch(path / MARK).is_file():
+        return f"{data} is not a data folder yet: the first library {asked.name} would be gathered in it."
+    folder = DataFolder(path)
+    pending = pending_library(folder, asked, Registry(folder))
+    return f"{pending.line}: {'a library would be gathered' if pending.is_due else 'nothing would be done'}"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
