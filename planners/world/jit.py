@@ -18,7 +18,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import numba
 from llvmlite import binding as llvm
-from numba.core import event, types
+from numba.core import cgutils, event, types
+from numba.core.boxing import box_tuple
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -28,6 +29,7 @@ from numba.core.caching import (
 )
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
+from numba.core.pythonapi import _boxers
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload, typeof_impl
 
@@ -232,6 +234,33 @@ class _Kernel(CPUDispatcher):
         for environment in cres._find_referenced_environments():
             cres.codegen.set_env(environment.env_name, environment)
         super().add_overload(cres)
+
+
+def _boxed(kind: Any, value: Any, made: Any) -> Any:
+    """Make a kernel's result, a tuple with or without names, a tuple of Python.
+
+    Ctrl-C is noticed here, where classes of tuples are called. Numba's own code then goes on with what was
+    not made, and the process crashes.
+    """
+    api, builder = made.pyapi, made.builder
+    result = cgutils.alloca_once_value(builder, api.get_null_object())
+    items = box_tuple(kind, value, made)
+    with builder.if_else(api.c_api_error()) as (failed, whole):
+        with failed:
+            api.decref(items)
+        with whole:
+            own = getattr(kind, "instance_class", None)
+            if own is not None:
+                named = made.env_manager.read_const(made.env_manager.add_const(own))
+                builder.store(api.call(named, items), result)
+                api.decref(items)
+            else:
+                builder.store(items, result)
+    return builder.load(result)
+
+
+_boxes: Any = _boxers.functions
+_boxes.update(dict.fromkeys((types.Tuple, types.UniTuple, types.NamedTuple, types.NamedUniTuple), _boxed))
 
 
 def _is_kernel(event: event.Event) -> bool:
