@@ -113,7 +113,7 @@ def judgement_line(judged: Judgement, who: str = "the challenger") -> str:
     time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
     return (
         f"{who} is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
-        f"{judged.problems:,} problems, and plans in {time}: {named}"
+        f"{judged.problems:,} problem{'' if judged.problems == 1 else 's'}, and plans in {time}: {named}"
     )
 
 

@@ -28,7 +28,7 @@ class LibraryOptions:
     """How a library is gathered and judged, and where.
 
     Args:
-        plans: How many questions to have answered, from the sources and from what was learned in turn.
+        plans: How many questions of the sources to have answered; what was learned comes in addition.
         poses: Share of the drawn questions that ask for a pose, not for a place.
         difficulty: Difficulty of classes and families.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
@@ -97,7 +97,8 @@ def retrain_library(
     from tasks.requests.gather import gathered_table
 
     write(gathered_table(made.counts), *made.tables)
-    write_answer(made.summary, library=name, version=made.version.number, verdict=made.verdict)
+    lines = [made.summary, *([made.beside] if made.beside else [])]
+    write_answer(*lines, library=name, version=made.version.number, verdict=made.verdict)
     write_files(library=made.folder, model=made.version.uri)
     return SHORT if sum(each.answered for each in made.counts) < options.plans else 0
 
@@ -126,7 +127,11 @@ def serve_library(
     from tasks.settings.environment import default_data
 
     given = _parameters(name, sources or [], options, reading)
-    serve(retrain_library_flow, ENTRYPOINT, given, options.data or default_data(), every, cron)
+    data, registered = (
+        options.data or default_data(),
+        _asked(name, sources or [], options, reading).registered,
+    )
+    serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, registered, on_drift=False)
 
 
 def retrain_library_flow() -> Flow[..., Any]:

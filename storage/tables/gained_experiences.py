@@ -24,7 +24,7 @@ from planners.world.vehicles.vehicle import Vehicle
 from storage.errors import InUseError, StorageError
 from storage.places.data_folder import QUESTIONS
 from storage.places.files import locked
-from storage.places.mirror import files_in, is_there, remove
+from storage.places.mirror import files_in, remove
 from storage.tables.columns import lists_of
 from storage.tables.experiences import (
     SearchedExperience,
@@ -38,7 +38,6 @@ from storage.tables.shards import read_table, sound, write_table
 MOST: Final = 5_000  # experiences per class: five times the default number of candidates for a memory
 SHARDS: Final = 16  # if there are more, they are merged
 SNAPSHOTS: Final = "snapshots"
-NAMELESS: Final = "learned"  # how a snapshot begins that was taken without a name
 DIGITS: Final = 8  # of a snapshot's digest
 MERGE_SECONDS: Final = 60.0  # at most: merging what is kept takes some seconds
 READINGS: Final = 3  # attempts to read shards that others may merge
@@ -89,10 +88,13 @@ def all_gained_shards(folder: Path) -> list[Path]:
     return [*gained_shards(folder), *gained_shards(folder / QUESTIONS)]
 
 
-def take_snapshot(folder: Path, name: str | None, vehicle: Vehicle) -> str:
-    """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
+def snapshots(folder: Path) -> list[Path]:
+    """All snapshots in the ``folder`` of a vehicle, of both."""
+    return [*gained_shards(folder / SNAPSHOTS), *gained_shards(folder / QUESTIONS / SNAPSHOTS)]
 
-    A name of None takes one snapshot of each content.
+
+def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
+    """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
 
     Returns the full name of the snapshot: the name and a digest of the content. Raises StorageError if
     nothing has been learned yet, InUseError if other processes hold the folder for longer than merging takes.
@@ -100,13 +102,12 @@ def take_snapshot(folder: Path, name: str | None, vehicle: Vehicle) -> str:
     if not gained_shards(folder):
         raise StorageError(f"{folder} holds no learned problems; solve problems with --learn first.")
     with locked(folder / ".lock", str(folder), MERGE_SECONDS):
-        taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet") if name else []
+        taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
         if taken:
             return taken[0].stem
         _, table, digest = _kept(folder, vehicle)
-        snapshot = f"{name or NAMELESS}-{digest[:DIGITS]}"
-        if not is_there(snapshot_path(folder, snapshot)):
-            write_table(snapshot_path(folder, snapshot), table)
+        snapshot = f"{name}-{digest[:DIGITS]}"
+        write_table(snapshot_path(folder, snapshot), table)
         return snapshot
 
 

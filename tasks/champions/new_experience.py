@@ -177,12 +177,19 @@ def _challenger_run(
     return RetrainingRun(run_settings, list(champions), champions)
 
 
-def next_number(registry: Registry) -> int:
-    """One more than that of the last retraining that was judged; an interrupted one keeps its number."""
+def next_number(registry: Registry, of_library: str | None = None) -> int:
+    """One more than that of the last retraining that was judged; an interrupted one keeps its number.
+
+    Each library has numbers of its own, because it is retrained alone (``of_library``: its registered name).
+    """
     numbers = [0]
-    for name in registry.names():
+    for name in registry.names() if of_library is None else [of_library]:
         champion = registry.aliased(name)
-        numbers += [version.retraining for version in registry.versions(name) if is_judged(version, champion)]
+        numbers += [
+            version.retraining
+            for version in registry.versions(name)
+            if is_judged(version, champion) and (of_library is not None or not version.is_library)
+        ]
     return 1 + max(numbers)
 
 

@@ -73,7 +73,7 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
         if version is not None and version.tag("verdict") in (AWAITING, PROMOTED)
     ]
     if not awaiting:
-        raise RunError(f"No challenger{_of(memory)} awaits approval; `retrain --approve` leaves one.")
+        raise RunError(f"No challenger{_of(memory)} awaits approval; `--approve` of a retraining leaves one.")
     changes, faults = [], []
     for challenger in awaiting:
         try:
@@ -95,7 +95,8 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
 
     Args:
         data: the data folder.
-        memory: the memory whose champion changes; None changes those that the last retraining promoted.
+        memory: the memory or library whose champion changes; None changes the memories that the last
+            retraining promoted. A library is retrained alone, so it is only changed by its name.
 
     Returns:
         the changes of champions.
@@ -105,7 +106,11 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
     """
     registry = _registry(data)
     current = [registry.aliased(name) for name in _names(registry, memory)]
-    champions = [version for version in current if version is not None and version.tag("previous")]
+    champions = [
+        version
+        for version in current
+        if version is not None and version.tag("previous") and not (memory is None and version.is_library)
+    ]
     if not champions:
         raise RunError(f"No champion{_of(memory)} has a previous one to roll back to.")
     last = max(champion.retraining for champion in champions)
@@ -144,14 +149,20 @@ def _registry(data: Path) -> Registry:
 
 
 def _names(registry: Registry, memory: str | None) -> Sequence[str]:
-    """All registered names, or those of one memory, given with or without the registry's prefix."""
+    """All registered names, or that of one memory, given with or without the registry's prefix.
+
+    The vehicle may be left out of its name where that is no other's.
+    """
     names = registry.names()
     if memory is None:
         return names
     matching = [name for name in names if name in (memory, PREFIX + memory)]
-    if not matching:
+    of_vehicles = matching or [name for name in names if name.startswith(f"{PREFIX}{memory}-")]
+    if len(of_vehicles) > 1:
+        raise RunError(f"Several memories are called {memory!r}; name one of them: {', '.join(of_vehicles)}.")
+    if not of_vehicles:
         raise RunError(f"No memory {memory!r} in the registry. Known: {', '.join(names) or 'none'}.")
-    return matching
+    return of_vehicles
 
 
 def _of(memory: str | None) -> str:

@@ -43,6 +43,8 @@ def serve(
     data: Path,
     every: float | None,
     cron: str | None,
+    name: str = NAME,
+    on_drift: bool = True,
 ) -> None:
     """Retrain on a schedule until Ctrl-C, one retraining at a time.
 
@@ -53,6 +55,8 @@ def serve(
         data: the data folder.
         every: seconds from one retraining to the next; a day if neither this nor ``cron`` is given.
         cron: when to retrain, as a cron expression.
+        name: of the deployment; one of a name is served at a time.
+        on_drift: whether to retrain also when hits have fallen.
 
     Raises:
         UsageError: both ``every`` and ``cron`` are given, or one of them is not a schedule.
@@ -62,12 +66,15 @@ def serve(
     with locked_folder(data) as folder:  # raises if it is in use; each retraining locks it again
         data_path = folder.path
     with local_server(data_path) as server:
-        deployment = _deployment(flow(), entrypoint, schedule, {**parameters, "data": str(data_path)})
+        deployment = _deployment(
+            flow(), entrypoint, schedule, {**parameters, "data": str(data_path)}, name, on_drift
+        )
         if server is not None:
             server.wait()
             _LOG.info(str(server))
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
-        _LOG.info("retrains %s, and whenever hits have fallen; Ctrl-C ends it", when)
+        fallen = ", and whenever hits have fallen" if on_drift else ""
+        _LOG.info("retrains %s%s; Ctrl-C ends it", when, fallen)
         try:
             _run(deployment)
         finally:
@@ -118,9 +125,14 @@ def _no_cron(text: str) -> UsageError:
 
 
 def _deployment(
-    flow: Flow[..., Any], entrypoint: str, schedule: dict[str, Any], parameters: dict[str, Any]
+    flow: Flow[..., Any],
+    entrypoint: str,
+    schedule: dict[str, Any],
+    parameters: dict[str, Any],
+    name: str,
+    on_drift: bool,
 ) -> RunnerDeployment:
-    """A deployment that retrains on the schedule, and whenever a drift event arrives."""
+    """A deployment that retrains on the schedule and, if so asked, whenever a drift event arrives."""
     from prefect.deployments.runner import RunnerDeployment
     from prefect.events import DeploymentEventTrigger
     from prefect.types.entrypoint import EntrypointType
@@ -128,11 +140,12 @@ def _deployment(
     try:
         deployment = RunnerDeployment.from_flow(
             flow,
-            NAME,
+            name,
             **schedule,
             parameters=parameters,
             tags=["motion-memory", "retraining"],
-            triggers=[DeploymentEventTrigger(name="retrain when hits have fallen", expect={DRIFT})],
+            triggers=[DeploymentEventTrigger(name="retrain when hits have fallen", expect={DRIFT})]
+            * on_drift,
             entrypoint_type=EntrypointType.MODULE_PATH,
         )
     except ValueError as error:  # how Prefect refuses a cron expression

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
-from planners.world.problem import Problem, begins_straight, is_canonical
+from planners.world.problem import Arrival, Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
-from storage.exchange.problems import fields_of
+from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place
 from storage.places.run_folder import checked_name
-from storage.tables.gained_experiences import add_gained, snapshot_path, take_snapshot
+from storage.tables.gained_experiences import add_gained, gained_shards, snapshot_path, take_snapshot
 from storage.vehicles.vehicle_files import label_of, said_vehicle
-from tasks.fan_out.keys import digest_of
 from tasks.settings.run_settings import RunSettings
 
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
-DIGITS: Final = 8  # of a question's digest, in its id
+DIGITS: Final = 12  # of a question's digest, in its id
 
 
 class Solved(NamedTuple):
@@ -54,7 +57,8 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
         if is_canonical(problem) and begins_straight(problem):
             straight.append((Experience(problem, attempt.plan, vehicle), attempt))
         elif attempt.source == "searched":
-            question = replace(problem, id=_own_id(problem, vehicle))
+            name = f"{problem.class_name}-{question_digest(problem)[:DIGITS]}"  # its own may come again
+            question = replace(problem, id=name)
             questions.append((Experience(question, attempt.plan, vehicle), attempt))
     label = label_of(vehicle)
     folder = open_data_folder(data)
@@ -71,24 +75,42 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     return len(straight) + len(questions)
 
 
-def _own_id(question: Problem, vehicle: Vehicle) -> str:
-    """The id of a question and a digest of what it asks: robots often give each file the same names."""
-    asked = fields_of(replace(question, id=""), vehicle)
-    return f"{question.id}-{digest_of(asked)[:DIGITS]}"
+def question_digest(question: Problem) -> str:
+    """A digest of what a question in the canonical frame asks, whatever it is called."""
+    arrival = question.arrival or Arrival()
+    motion = np.trim_zeros(np.array(question.start_motion, float), "b")
+    heading = math.nan if arrival.heading is None else arrival.heading
+    numbers = (
+        *((*question.start, *question.goal, question.goal_radius, *question.bounds, question.scale),),
+        motion,
+        (heading, arrival.heading_tolerance, arrival.least_speed, arrival.most_speed),
+        *(arrival.hitches, arrival.hitch_tolerances),
+        question.obstacles.vertices.ravel(),
+        *(question.obstacles.piece_starts, question.obstacles.obstacle_starts),
+    )
+    digest = hashlib.sha256()
+    for each in numbers:
+        digest.update(np.array([len(each), *each], np.float64).tobytes())
+    return digest.hexdigest()
 
 
-def snapshot_of_questions(data: Path | str, vehicle: Vehicle, name: str | None = None) -> Path:
+def snapshot_of_questions(data: Path | str, vehicle: Vehicle, name: str) -> Path:
     """The file of a snapshot of the general questions that a vehicle answered on the job.
 
     Args:
         data: the data folder.
         vehicle: who drives.
-        name: name of the snapshot, which is taken when the name is first used; None takes what there is now.
+        name: name of the snapshot, which is taken when the name is first used.
 
     Raises:
         StorageError: none was learned for the vehicle.
     """
     folder = open_data_folder(data).gained_questions(label_of(vehicle))
+    if not gained_shards(folder):
+        raise StorageError(
+            f"{data} holds no questions that {label_of(vehicle)} has learned; solve problems with --learn "
+            "first, or name the vehicle that did."
+        )
     return snapshot_path(folder, take_snapshot(folder, name, vehicle))
 
 

@@ -1,80 +1,99 @@
-"""A challenger: gathered anew, or the champion's plans and those of new questions."""
+"""A challenger: the champion's plans or new ones of all sources, and those of what was learned since."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
 
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from storage.archives.libraries import how_gathered, load_library, save_library
-from storage.places.files import remove_folder
+from storage.places.mirror import remove
 from storage.tables.experiences import merge_experiences, read_experiences
 from tasks.libraries.pending_library import LibraryRetraining
 from tasks.requests.gather import (
     GatherFlow,
     SourceCounts,
-    gather,
+    answers_of,
+    library_of,
+    warn_if_short,
 )
 from tasks.requests.question_sources import is_held_back
 
+LEARNED = "learned"  # the name of a source
 
-def gather_anew(
+
+def make_challenger(
     asked: LibraryRetraining,
-    sources: Sequence[str],
-    snapshot: Path | None,
+    champion: Path | None,
+    learned: Path | None,
     out: Path,
     workers: int,
     flow: GatherFlow | None,
-) -> Sequence[SourceCounts]:
-    """Gather a library from all sources: as many drawn questions as are asked for, and all learned ones."""
+) -> list[SourceCounts]:
+    """Write a library: the plans to begin with, and those of learned questions that these do not answer.
+
+    If the command is killed, the same command asks only what is left.
+
+    Args:
+        asked: which library, and how.
+        champion: the library to begin with; None gathers from the sources.
+        learned: the file of what was learned until now; None if there is nothing.
+        out: the folder to write.
+        workers: number of worker processes.
+        flow: gathers in worker processes, as for ``gather``.
+
+    Returns:
+        what came of each source; nothing, and nothing is written, if the champion has all there is.
+
+    Raises:
+        RunError: no question could be answered.
+        StorageError: a source, the champion, or what an earlier command wrote to ``out`` cannot be read.
+    """
     vehicle = asked.settings.vehicle
-    learned = [] if snapshot is None else read_experiences(snapshot, vehicle)
-    plans = asked.plans + sum(not is_held_back(each.problem) for each in learned)
-    settings = replace(asked.settings, count=asked.plans)  # a map's windows do not depend on what was learned
-    return gather(sources, out, plans, asked.poses, asked.difficulty, settings, workers, flow, "train")
-
-
-def add_learned(
-    asked: LibraryRetraining,
-    champion: Path,
-    snapshot: Path,
-    seen: set[str],
-    out: Path,
-    workers: int,
-    flow: GatherFlow | None,
-) -> Sequence[SourceCounts]:
-    """Write the champion's plans, and those of the learned questions that are in no ``seen`` snapshot."""
     if (kept := how_gathered(out)) is not None:  # by a command that was killed later
+        load_library(out, vehicle)
         return [SourceCounts(**each) for each in kept["sources"]]
-    vehicle = asked.settings.vehicle
-    old = load_library(champion, vehicle)
-    new_out = out.with_name(f"{out.name}-new")
-    learned = read_experiences(snapshot, vehicle)
-    rows = [
-        row
-        for row, each in enumerate(learned)
-        if each.problem.id not in seen and not is_held_back(each.problem)
-    ]
-    new_questions = snapshot.with_name(f"{snapshot.stem}-new.parquet")
-    merge_experiences([snapshot], new_questions, rows)
-    counts = [
-        _counts_of(old),
-        *gather(
-            *([str(new_questions)], new_out, len(rows), asked.poses, "standard", asked.settings),
-            *(workers, flow, "train"),
-        ),
-    ]
-    new = load_library(new_out, vehicle)
-    answered = [*zip(old.questions, old.plans, strict=True), *zip(new.questions, new.plans, strict=True)]
-    name = old.class_name if old.class_name == new.class_name else "general"
-    scales = tuple(sorted({*old.scales, *new.scales}))
-    sources = [each._asdict() for each in counts]
-    save_library(out, gathered_library(name, vehicle, answered, scales), {"asked": "", "sources": sources})
-    remove_folder(new_out)
-    return counts
+    old = None if champion is None else load_library(champion, vehicle)
+    known = set() if old is None else set(old.questions)
+    questions = [] if learned is None else [each.problem for each in read_experiences(learned, vehicle)]
+    rows = [row for row, each in enumerate(questions) if each.id not in known and not is_held_back(each)]
+    libraries, counts = ([], []) if old is None else ([old], [_counts_of(old)])
+    new = out.with_name(f"{out.name}-new.parquet")
+    with ExitStack() as stack:
+        if old is None and asked.sources:
+            drawn, of_sources = stack.enter_context(answers_of(asked.request(out), workers, flow))
+            warn_if_short(of_sources, asked.plans)
+            libraries.append(library_of(vehicle, drawn))
+            counts += of_sources
+        if learned is not None and rows:
+            merge_experiences([learned], new, rows)
+            place = out.with_name(f"{out.name}-learned")
+            request = replace(
+                asked.request(place), sources=(LEARNED,), plans=len(rows), learned={LEARNED: str(new)}
+            )
+            answers, of_learned = stack.enter_context(answers_of(request, workers, flow))
+            libraries.append(library_of(vehicle, answers))
+            counts += of_learned
+        if old is None or rows:
+            how = {"asked": "", "sources": [each._asdict() for each in counts]}
+            save_library(out, _joined(libraries), how)
+    remove(new)
+    return counts if old is None or rows else []
+
+
+def _joined(libraries: Sequence[PlanLibrary]) -> PlanLibrary:
+    """The plans of all of some libraries."""
+    names = {each.class_name for each in libraries}
+    return gathered_library(
+        names.pop() if len(names) == 1 else "general",
+        libraries[0].vehicle,
+        [pair for each in libraries for pair in zip(each.questions, each.plans, strict=True)],
+        tuple(sorted({scale for each in libraries for scale in each.scales})),
+    )
 
 
 def _counts_of(library: PlanLibrary) -> SourceCounts:
@@ -83,4 +102,4 @@ def _counts_of(library: PlanLibrary) -> SourceCounts:
     for question, plan in zip(library.questions, library.plans, strict=True):
         quickest[question] = min(plan.duration_s, quickest.get(question, math.inf))
     asked = len(quickest)
-    return SourceCounts("the champion's", asked, asked, len(library.plans), fmean(quickest.values()))
+    return SourceCounts("champion", asked, asked, len(library.plans), fmean(quickest.values()))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -31,10 +33,11 @@ from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.gather_pieces import COLLECTOR, GIVE_UP, GatherRequest, read_sources
 from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unfinished
+from tasks.requests.question_sources import turn_of
 
 ASSIST: Final = "repair"  # the usual one with a memory
 TOP_K: Final = 5
-PIECE: Final = 10  # questions
+PIECE: Final = 20  # questions
 NOTICED_S: Final = 0.05  # more plans cost milliseconds to look through, where manoeuvres take seconds
 FEWEST: Final = 20  # questions of a class that are judged apart; of fewer an interval says nothing
 OTHERS, ALL = "other questions", "all questions"
@@ -68,32 +71,37 @@ class Judging:
         )
 
 
+class SideFigures(NamedTuple):
+    """What a side did, over all questions."""
+
+    name: str
+    planning_ms: float  # mean
+    driving_s: float  # mean of the questions that all sides have solved; NaN if there are none
+    solved: float  # share
+    from_memory: float  # share; NaN without one
+
+
 class LibraryJudgement(NamedTuple):
     """How a library does beside the planner alone, and beside the champion."""
 
     alone: Judgement
     champion: Judgement | None  # None if there is no champion
-    table: CellTable  # a row for each of them
+    sides: list[SideFigures]  # what each of them did
 
 
-def judge_library(judging: Judging) -> LibraryJudgement | None:
+def judge_library(judging: Judging) -> LibraryJudgement:
     """Have all questions answered by each side and by the planner alone, and judge the challenger.
 
     If the command is killed, the same command has only the rest answered.
 
     Args:
-        judging: the questions and the sides.
-
-    Returns:
-        the judgements; None if there is no question.
+        judging: the questions, of which there is at least one, and the sides.
 
     Raises:
         PlanFaultError: the authority refuses an answer.
         StorageError: a library or a source cannot be read.
     """
-    count = len(_questions(judging.questions, judging.questions.digest))
-    if count == 0:
-        return None
+    count = len(questions_of(judging.questions))
     if not shard_is_done(judging.out, judging.digest):
         pieces = [JudgedPiece(judging, number) for number in range(-(-count // PIECE))]
         with unfinished(judging.out):
@@ -116,27 +124,44 @@ def judged(rows: pd.DataFrame) -> LibraryJudgement:
         problem_class=_panels(rows["problem_class"], rows["problem_id"]),
     )
     alone, champion, challenger = (alike[alike["run_id"] == side] for side in (ALONE, CHAMPION, CHALLENGER))
-    return LibraryJudgement(
-        judge(alone, challenger, noticed_s=NOTICED_S),
-        judge(champion, challenger, noticed_s=NOTICED_S) if len(champion) else None,
-        _table(alone, champion, challenger),
-    )
+    against = judge(champion, challenger, noticed_s=NOTICED_S) if len(champion) else None
+    if against is not None and against.problems < FEWEST:
+        told = f"a verdict needs {FEWEST} held-back questions, and there are only {against.problems}"
+        against = against._replace(passes=False, why=told)
+    sides = _figures([side for side in (alone, champion, challenger) if len(side)])
+    return LibraryJudgement(judge(alone, challenger, noticed_s=NOTICED_S), against, sides)
 
 
-def _table(*sides: pd.DataFrame) -> CellTable:
-    """What each side that answered did, over all questions."""
+def _figures(sides: Sequence[pd.DataFrame]) -> list[SideFigures]:
+    solved = set.intersection(*(set(side["problem_id"][side["solved"]]) for side in sides))
+    figures = []
+    for side in sides:
+        name = str(side["run_id"].iloc[0])
+        figures.append(
+            SideFigures(
+                name or "alone",
+                1e3 * float(side["planning_seconds"].mean()),
+                float(side["duration_s"][side["problem_id"].isin(solved)].mean()),
+                float(side["solved"].mean()),
+                math.nan if name == ALONE else float(side["hit"].mean()),
+            )
+        )
+    return figures
+
+
+def sides_table(judgement: LibraryJudgement) -> CellTable:
+    """A row for each side: what it did, over all questions."""
     rows = [
         [
-            side["run_id"].iloc[0] or "no memory",
-            decimal(1e3 * side["planning_seconds"].mean(), 1),
-            decimal(side["duration_s"].mean(), 2),
-            percent(side["solved"].mean()),
-            NOTHING if side["run_id"].iloc[0] == ALONE else percent(side["hit"].mean()),
+            each.name,
+            decimal(each.planning_ms, 1),
+            decimal(each.driving_s, 2),
+            percent(each.solved),
+            NOTHING if math.isnan(each.from_memory) else percent(each.from_memory),
         ]
-        for side in sides
-        if len(side)
+        for each in judgement.sides
     ]
-    title = f"{sides[-1]['problem_id'].nunique():,} held-back questions"
+    title = f"{judgement.alone.problems:,} held-back questions"
     return CellTable(title, HEADINGS, [[row] for row in rows], "library-judgement", FIELDS)
 
 
@@ -155,6 +180,11 @@ class JudgedPiece(NumberedPiece[Judging]):
 
     class_name: str = "questions"
 
+    @property
+    def questions(self) -> Sequence[Problem]:
+        """The questions."""
+        return questions_of(self.request.questions)[self.index * PIECE : (self.index + 1) * PIECE]
+
 
 def judge_piece(piece: JudgedPiece) -> None:
     """Have the questions of a piece answered, with cold caches, and write the attempts.
@@ -162,7 +192,7 @@ def judge_piece(piece: JudgedPiece) -> None:
     Raises PlanFaultError if the authority refuses a plan.
     """
     asked, vehicle = piece.request.questions, piece.request.questions.settings.vehicle
-    questions = _questions(asked, asked.digest)[piece.index * PIECE : (piece.index + 1) * PIECE]
+    questions = piece.questions
     sides = [(ALONE, None), *((each.name, _library(each, vehicle)) for each in piece.request.sides)]
     workspace, seed = Workspace(), asked.settings.seed
 
@@ -175,8 +205,9 @@ def judge_piece(piece: JudgedPiece) -> None:
             workspace=workspace,
         )
 
-    for number in range(len(sides)):  # anything made on first use exists before time counts
-        attempt(questions[-1], number)
+    kinds = {_is_pose(question): question for question in questions}
+    for question, number in product(kinds.values(), range(len(sides))):
+        attempt(question, number)  # anything made on first use exists before time counts
     attempts = in_turn(questions, len(sides), seed, attempt)
     rows = []
     for number, question in enumerate(questions):
@@ -191,7 +222,7 @@ JUDGE_LIBRARY: Final = Job(
     name="judge",
     do=judge_piece,
     output=lambda piece: piece.shard,
-    units=lambda piece: PIECE,
+    units=lambda piece: len(piece.questions),
     unit="questions",
 )
 
@@ -201,17 +232,29 @@ def _library(side: Side, vehicle: Vehicle) -> PlanLibrary:
     return load_library(side.folder, vehicle)
 
 
+def questions_of(request: GatherRequest) -> Sequence[Problem]:
+    """The questions of a request, in the canonical frame: as many as are wanted, or as there are.
+
+    Raises StorageError if a source cannot be read, or has none of this share.
+    """
+    return _questions(request, request.digest)
+
+
 @functools.lru_cache(maxsize=1)
 def _questions(request: GatherRequest, _digest: str) -> Sequence[Problem]:
-    """The questions, in the canonical frame: as many as are wanted, or as there are."""
     sources = read_sources(request)
     most = min(GIVE_UP * request.plans, max(source.most for source in sources) * len(sources))
-    found: list[Problem] = []
+    found: dict[str, Problem] = {}
     number = 0
     while len(found) < request.plans and number < most:
-        source, own = sources[number % len(sources)], number // len(sources)
-        question = source.draw(own) if own < source.most else None
-        if question is not None:
-            found.append(to_canonical(question)[0])
+        source, own = turn_of(sources, number)
+        drawn = source.question(own)
+        if drawn is not None:
+            identity = drawn.id if drawn.id not in found else f"{drawn.id} ({number})"
+            found[identity] = replace(to_canonical(drawn)[0], id=identity)
         number += 1
-    return found
+    return list(found.values())
+
+
+def _is_pose(question: Problem) -> bool:
+    return question.arrival is not None and question.arrival.heading is not None

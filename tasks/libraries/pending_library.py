@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from planners.world.classes.problem_classes import CLASSES
+from planners.world.vehicles.vehicle import VEHICLES
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.mirror import fetch, is_remote, local_place
@@ -20,7 +21,14 @@ from tasks.requests.gather import (
     check_asked_questions,
 )
 from tasks.requests.gather_pieces import GatherRequest
-from tasks.requests.question_sources import is_drawn, is_held_back
+from tasks.requests.question_sources import (
+    OWN_SEEDS,
+    drawn_source,
+    is_data_folder,
+    is_drawn,
+    is_held_back,
+    named_source,
+)
 from tasks.settings.checks import check_count
 from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import COMBINED
@@ -46,12 +54,12 @@ class LibraryRetraining(NamedTuple):
 
     def recipe(self) -> str:
         """A digest of everything that is asked for, but for what was learned."""
-        return self.request(Path(), self.sources).asked
+        return self.request(Path()).asked
 
-    def request(self, out: Path, sources: Sequence[str]) -> GatherRequest:
-        """What is gathered from some sources."""
+    def request(self, out: Path) -> GatherRequest:
+        """What is gathered from the sources."""
         return GatherRequest(
-            *(tuple(sources), out, self.plans, self.poses, self.difficulty, self.settings, "train")
+            *(self.sources, out, self.plans, self.poses, self.difficulty, self.settings, "train")
         )
 
 
@@ -77,17 +85,35 @@ def library_retraining(
 ) -> LibraryRetraining:
     """Check what is asked for; paths become absolute. The arguments are those of ``LibraryRetraining``.
 
-    Raises UsageError if a name or a number is wrong.
+    Raises UsageError if a name or a number is wrong, StorageError if a source is missing.
     """
     try:
         checked_name(name)
     except StorageError as error:
         raise UsageError(str(error)) from None
-    if name in (*CLASSES, COMBINED):
+    label = label_of(settings.vehicle)
+    if registered_name(name, label) in {
+        registered_name(memory, vehicle) for memory in (*CLASSES, COMBINED) for vehicle in VEHICLES
+    }:
         raise UsageError(f"{name} is the name of a run's memory: give the library another.")
     check_count("test problems", test_problems)
     check_asked_questions(plans, poses, difficulty, sources)
+    if settings.seed >= OWN_SEEDS:
+        raise UsageError(f"Seed {settings.seed}: give one below {OWN_SEEDS:,}; those above draw what judges.")
+    for each in sources:
+        if is_drawn(each):
+            drawn_source(each, difficulty, settings.vehicle)
+        elif not is_remote(each):
+            named_source(each)
     own = [each if is_drawn(each) or is_remote(each) else str(Path(each).absolute()) for each in sources]
+    for each in own:
+        if own.count(each) > 1:
+            raise UsageError(f"{each} is given twice: name each source once.")
+        if is_data_folder(each):
+            raise UsageError(
+                f"{each} is a data folder: what was learned in that of --data is a source in any case, and "
+                "no other can be one."
+            )
     return LibraryRetraining(*(name, tuple(own), plans, poses, difficulty, settings, test_problems, approve))
 
 
@@ -103,7 +129,7 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
         RunError: the registry cannot be reached.
         UsageError: there are no sources, and nothing was learned.
     """
-    vehicle, number = asked.settings.vehicle, next_number(registry)
+    vehicle, number = asked.settings.vehicle, next_number(registry, asked.registered)
     place = folder.gained_questions(label_of(vehicle))
     learned = [each.experience.problem for each in read_gained(place, vehicle)]
     champion = registry.aliased(asked.registered)
@@ -115,13 +141,19 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
             )
         line = f"{asked.name}: no champion yet; {_counted(len(learned), 'learned question')}"
         return PendingLibrary(None, number, True, True, line)
+    if champion.tag("vehicle") not in ("", label_of(vehicle)):
+        raise UsageError(
+            f"{asked.registered} is a library of {champion.tag('vehicle')}: give this one another name."
+        )
     judged = [each for each in registry.versions(asked.registered) if is_judged(each, champion)]
     seen = {identity for each in judged for identity in snapshot_ids(place, each.tag("learned"))}
     new = sum(question.id not in seen and not is_held_back(question) for question in learned)
     recipe, known = asked.recipe(), {each.tag("recipe") for each in (champion, *judged)}
     line = f"{asked.name}: champion is version {champion.number}; "
     line += f"{_counted(new, 'new question')} to learn from" if new else "nothing new was learned"
-    line += "" if recipe in known else ", and it was not asked for in this way before"
+    line += (
+        "" if recipe in known else f"{', and' if new else ', but'} it was not asked for in this way before"
+    )
     is_anew = recipe != champion.tag("recipe")
     return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
 

@@ -13,20 +13,23 @@ from dashboards.cells import CellTable, as_markdown
 from dashboards.verdicts.promotion import judgement_line, judgement_markdown, judgement_tables
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
-from storage.tables.gained_experiences import gained_shards, snapshot_ids
+from storage.tables.gained_experiences import gained_shards
 from storage.vehicles.vehicle_files import label_of
 from tasks.champions.conclude import settle, summary_of, verdict_on
 from tasks.champions.new_experience import note_verdict
 from tasks.fan_out.keys import key_of
 from tasks.inputs.gained_on_the_job import snapshot_of_questions
-from tasks.libraries.challenger import add_learned, gather_anew
+from tasks.libraries.challenger import LEARNED, make_challenger
 from tasks.libraries.judge_library import (
     CHALLENGER,
     CHAMPION,
+    FEWEST,
     Judging,
     LibraryJudgement,
     Side,
     judge_library,
+    questions_of,
+    sides_table,
 )
 from tasks.libraries.pending_library import LibraryRetraining, PendingLibrary, pending_library
 from tasks.registry.champion_registry import Registry, Version
@@ -37,7 +40,7 @@ from tasks.requests.gather import (
     SourceCounts,
     gathered_metrics,
 )
-from tasks.requests.question_sources import settled_source
+from tasks.requests.gather_pieces import GatherRequest
 from tasks.session.folder_lock import locked_folder
 from tasks.settings.errors import RunError, UsageError
 from tasks.tracking.artifacts import publish_judgements
@@ -54,8 +57,17 @@ class RetrainedLibrary(NamedTuple):
     counts: Sequence[SourceCounts]  # what came of each source
     version: Version
     verdict: str
-    summary: str  # one line
+    summary: str  # what became of it, in a line
+    beside: str  # how it does beside the planner without a memory, in a line; empty if nothing was judged
     tables: Sequence[CellTable]  # of the judgement
+
+
+class _Challenger(NamedTuple):
+    title: str
+    folder: Path
+    counts: Sequence[SourceCounts]
+    learned: str  # name of the snapshot; empty if nothing was learned
+    judgement: LibraryJudgement | None  # None if there was nothing to judge by
 
 
 def retrain_library(
@@ -63,7 +75,7 @@ def retrain_library(
 ) -> RetrainedLibrary | None:
     """Gather a library with what was learned since the champion, and promote it if robots are there sooner.
 
-    Questions of files and learned ones are split by their ids: one in four is never gathered, and only
+    Questions of files and learned ones are split by what they ask: one in four is never gathered, and only
     judges. The first library becomes the champion. If the command is killed, the same command goes on.
 
     Args:
@@ -85,8 +97,6 @@ def retrain_library(
     with locked_folder(data) as folder:
         if folder.is_remote:
             raise UsageError(f"{data} is in object storage; libraries are retrained in a folder on a disk.")
-        vehicle = asked.settings.vehicle
-        asked = asked._replace(sources=tuple(settled_source(each, vehicle) for each in asked.sources))
         registry = Registry(folder)
         note_verdict(registry, registry.aliased(asked.registered))
         pending = pending_library(folder, asked, registry)
@@ -103,106 +113,134 @@ def _retrained(
     pending: PendingLibrary,
     workers: int,
     flow: GatherFlow | None,
-) -> RetrainedLibrary:
+) -> RetrainedLibrary | None:
     vehicle, number = asked.settings.vehicle, pending.number
     snapshot = None
     if gained_shards(folder.gained_questions(label_of(vehicle))):
         snapshot = snapshot_of_questions(folder.place, vehicle, f"{asked.name}-{number:04d}")
     learned = "" if snapshot is None else snapshot.stem
-    sources = (*asked.sources, *([] if snapshot is None else [str(snapshot)]))
     before = pending.champion
-    made_of = key_of(asked.request(Path(), sources).asked, "" if before is None else before.number)
+    made_of = key_of(asked.recipe(), learned, "" if before is None else before.number)
     title = f"{asked.name}-{number:04d}-{made_of[:6]}"
     out = folder.libraries / title
+    questions = _held_back(asked, snapshot, number, out, before is None)
     with scratch_folder() as scratch:
         champion = None if before is None else registry.fetch(before, str(scratch))
-        if before is None or champion is None or snapshot is None or pending.is_anew:
-            counts = gather_anew(asked, sources, snapshot, out, workers, flow)
-        else:
-            seen = snapshot_ids(snapshot.parents[1], before.tag("learned"))
-            counts = add_learned(asked, champion, snapshot, seen, out, workers, flow)
-        judgement = _judged(folder, asked, number, sources, champion, out)
+        begun = None if pending.is_anew else champion
+        counts = make_challenger(asked, begun, snapshot, out, workers, flow)
+        if not counts:
+            _LOG.info("%s: the champion answers all questions that were learned", asked.name)
+            return None
+        judgement = _judged(folder, questions, champion, out)
+    made = _Challenger(title, out, counts, learned, judgement)
+    version, verdict, markdown = _registered(folder, asked, registry, pending, made)
     ours = None if judgement is None else judgement.champion
-    verdict = verdict_on(ours, asked.approve)
-    parameters = {
-        "sources": shlex.join([*asked.sources, *([learned] if learned else [])]),
-        **{name: getattr(asked, name) for name in ("plans", "poses", "difficulty", "test_problems")},
-        "seed": asked.settings.seed,
-    }
-    metrics = gathered_metrics(counts)
-    logged = log_library(folder, asked.name, out, vehicle, parameters, metrics)
-    tags: dict[str, Any] = {
-        "memory": asked.name,
-        "vehicle": label_of(vehicle),
-        "learned": learned,
-        "recipe": asked.recipe(),
-        "retraining": number,
-        "digest": logged.digest,
-        "against": "" if before is None else before.number,
-    }
-    if judgement is not None:
-        tags["sooner_than_alone_s"] = f"{judgement.alone.sooner_s:.6f}"
-    if ours is not None:
-        figures = {name: f"{getattr(ours, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
-        tags |= figures | {"why": ours.why}
-    markdown = _markdown(title, learned, verdict, judgement)
-    key = key_of(title, logged.digest)
-    version = registry.register(asked.registered, logged.run_id, logged.model_id, key, tags, markdown)
-    _log_judgement(folder, logged.run_id, verdict, judgement, markdown)
     summary = summary_of(version, before, verdict, ours)
-    if judgement is not None:
-        summary += f"; beside the planner without a memory {judgement_line(judgement.alone, 'it')}"
     faults = settle(registry, [(version, verdict)])
     if flow is not None:
         publish_judgements(title, [(asked.name, summary, markdown)])
     if faults:
         raise RunError(" ".join(faults))
-    tables = [] if judgement is None else [judgement.table]
+    if judgement is None:
+        return RetrainedLibrary(out, counts, version, verdict, summary, "", [])
+    if judgement.alone.high_s < 0.0:
+        _LOG.warning("With %s robots are there later than without a memory.", title)
+    tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
+    return RetrainedLibrary(out, counts, version, verdict, summary, _beside(judgement), tables)
+
+
+def _registered(
+    folder: DataFolder,
+    asked: LibraryRetraining,
+    registry: Registry,
+    pending: PendingLibrary,
+    made: _Challenger,
+) -> tuple[Version, str, str]:
+    """Log a library and the judgement in MLflow, and register it: the version, the verdict, and its text."""
+    ours = None if made.judgement is None else made.judgement.champion
+    verdict = verdict_on(ours, asked.approve)
+    parameters = {
+        "sources": shlex.join([*asked.sources, *([made.learned] if made.learned else [])]),
+        **{name: getattr(asked, name) for name in ("plans", "poses", "difficulty", "test_problems")},
+        "seed": asked.settings.seed,
+    }
+    vehicle = asked.settings.vehicle
+    logged = log_library(folder, asked.name, made.folder, vehicle, parameters, gathered_metrics(made.counts))
+    tags: dict[str, Any] = {
+        "memory": asked.name,
+        "vehicle": label_of(vehicle),
+        "learned": made.learned,
+        "recipe": asked.recipe(),
+        "retraining": pending.number,
+        "digest": logged.digest,
+        "against": "" if pending.champion is None else pending.champion.number,
+    }
+    if made.judgement is not None:
+        tags["sooner_than_alone_s"] = f"{made.judgement.alone.sooner_s:.6f}"
     if ours is not None:
-        tables += judgement_tables(ours)
-    return RetrainedLibrary(out, counts, version, verdict, summary, tables)
+        figures = {name: f"{getattr(ours, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
+        tags |= figures | {"why": ours.why}
+    markdown = _markdown(made, verdict)
+    key = key_of(made.title, logged.digest)
+    version = registry.register(asked.registered, logged.run_id, logged.model_id, key, tags, markdown)
+    _log_judgement(folder, logged.run_id, verdict, made.judgement, markdown)
+    return version, verdict, markdown
+
+
+def _held_back(
+    asked: LibraryRetraining, snapshot: Path | None, number: int, library: Path, is_first: bool
+) -> GatherRequest:
+    """The questions that judge, which no library is gathered from; those that are drawn are others each time.
+
+    Raises RunError if they are too few for a verdict; a first champion needs none.
+    """
+    learned = {} if snapshot is None else {LEARNED: str(snapshot)}
+    request = replace(
+        asked.request(library),
+        sources=(*asked.sources, *learned),
+        learned=learned,
+        plans=asked.test_problems,
+        settings=replace(asked.settings, seed=number),
+        share="test",
+    )
+    count = len(questions_of(request))
+    if count < FEWEST and not is_first:
+        raise RunError(
+            f"{_counted(count, 'question')} held back to judge {asked.name} by, and a verdict needs "
+            f"{FEWEST}: raise --test-problems, or name a class, a family, a map or worlds among its sources."
+        )
+    return request
 
 
 def _judged(
-    folder: DataFolder,
-    asked: LibraryRetraining,
-    number: int,
-    sources: Sequence[str],
-    champion: Path | None,
-    challenger: Path,
+    folder: DataFolder, questions: GatherRequest, champion: Path | None, challenger: Path
 ) -> LibraryJudgement | None:
-    """Judge a library by questions that no library is gathered from, others at each retraining."""
-    questions = replace(
-        asked.request(challenger, sources),
-        plans=asked.test_problems,
-        settings=replace(asked.settings, seed=number),
-        asked_of="test",
-    )
+    if not questions_of(questions):
+        return None
     sides = [
         Side(name, place, memory_digest(place))
         for name, place in ((CHAMPION, champion), (CHALLENGER, challenger))
         if place is not None
     ]
     out = folder.judged_libraries / f"{challenger.name}.parquet"
-    judgement = judge_library(Judging(out, questions, tuple(sides)))
-    if judgement is None and champion is not None:
-        raise RunError(
-            f"No question is held back to judge {asked.name} by: name a class, a family, a map or worlds "
-            "among its sources, or learn more."
-        )
-    return judgement
+    return judge_library(Judging(out, questions, tuple(sides)))
 
 
-def _markdown(title: str, learned: str, verdict: str, judgement: LibraryJudgement | None) -> str:
-    parts = [f"Library *{title}*, learned: `{learned or 'nothing'}`."]
+def _markdown(made: _Challenger, verdict: str) -> str:
+    judgement = made.judgement
+    parts = [f"Library *{made.title}*, learned: `{made.learned or 'nothing'}`."]
     if judgement is None or judgement.champion is None:
         parts.append("There was no champion. This library is the first; all its plans were checked.")
     else:
         parts.append(judgement_markdown(judgement.champion, verdict))
     if judgement is not None:
-        parts.append(f"Beside the planner without a memory {judgement_line(judgement.alone, 'it')}.")
-        parts.append(as_markdown([judgement.table]))
+        parts.append(f"{_beside(judgement)}.")
+        parts.append(as_markdown([sides_table(judgement)]))
     return "\n\n".join(parts) + "\n"
+
+
+def _beside(judgement: LibraryJudgement) -> str:
+    return f"Beside the planner without a memory {judgement_line(judgement.alone, 'it')}"
 
 
 def _log_judgement(
@@ -212,11 +250,18 @@ def _log_judgement(
     log = tracker(folder.place)
     log.tag(run_id, {"verdict": verdict})
     if judgement is not None:
-        alone = judgement_metrics(judgement.alone)
-        log.metrics(run_id, [{f"alone/{name}": value for name, value in alone.items()}])
+        ends = {name: getattr(judgement.alone, name) for name in ("sooner_s", "low_s", "high_s")}
+        log.metrics(run_id, [{f"beside-alone/{name}": value for name, value in ends.items()}])
+        for side in judgement.sides:
+            figures = {name: value for name, value in side._asdict().items() if name != "name"}
+            log.metrics(run_id, [{f"{side.name}/{name}": value for name, value in figures.items()}])
         if judgement.champion is not None:
             log.metrics(run_id, [judgement_metrics(judgement.champion)])
     with scratch_folder() as scratch:
         file = scratch / "verdict.md"
         file.write_text(markdown, encoding="utf-8")
         log.artifacts(run_id, file)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what} is" if count == 1 else f"{count:,} {what}s are"

@@ -55,6 +55,11 @@ class Version(NamedTuple):
         return self.tags.get(name, "")
 
     @property
+    def is_library(self) -> bool:
+        """Whether it is a library that was retrained by itself."""
+        return bool(self.tag("recipe"))
+
+    @property
     def retraining(self) -> int:
         """The number of the retraining that made this version; 0 if none did."""
         number = self.tag("retraining")

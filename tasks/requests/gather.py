@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -13,12 +15,16 @@ from statistics import fmean
 from typing import Final, NamedTuple
 
 from dashboards.cells import NOTHING, CellTable, decimal
-from planners.memory.library.plan_library import gathered_library
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.plans.experience import Experience
 from planners.world.classes.problem_classes import DIFFICULTIES
+from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.libraries import how_gathered, load_library, save_library
+from storage.places.mirror import remove
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
+from tasks.fan_out.keys import digest_of
+from tasks.inputs.gained_on_the_job import snapshot_of_questions
 from tasks.requests.gather_pieces import (
     GATHER,
     Gathered,
@@ -34,7 +40,7 @@ from tasks.requests.part_folder import (
     remove_parts,
     unfinished,
 )
-from tasks.requests.question_sources import Asked, is_drawn, settled_source, shown_name
+from tasks.requests.question_sources import Share, is_data_folder, is_drawn
 from tasks.settings.checks import check_count, check_known, check_outputs
 from tasks.settings.errors import RunError, UsageError
 
@@ -73,7 +79,7 @@ def gather(
     settings: ImportSettings,
     workers: int = 1,
     flow: GatherFlow | None = None,
-    asked_of: Asked = "all",
+    share: Share = "all",
 ) -> list[SourceCounts]:
     """Draw questions from each source in turn until enough are answered, and write the plans as a library.
 
@@ -97,7 +103,7 @@ def gather(
         workers: number of worker processes.
         flow: gathers in worker processes. It is called once Prefect's environment is set, so it may import
             Prefect. None does everything in this process.
-        asked_of: which questions of the sources.
+        share: which questions of the sources.
 
     Returns:
         what came of each source; of an earlier command that asked for the same, if ``out`` holds its library.
@@ -108,12 +114,12 @@ def gather(
         RunError: no question could be answered.
     """
     check_asked_questions(plans, poses, difficulty, sources)
-    sources = [settled_source(each, settings.vehicle) for each in sources]
-    check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
+    paths = [Path(each) for each in sources if not is_drawn(each) and not is_data_folder(each)]
+    check_outputs(paths, [out])
     for name in sources:
         if is_drawn(name) and Path(name).exists():
             _LOG.warning("%s is taken for the class or family; write ./%s for the folder here.", name, name)
-    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings, asked_of)
+    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings, share)
     asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
     if gathered is not None and gathered["asked"] == asked:
         load_library(out, settings.vehicle)  # StorageError if it is damaged
@@ -121,7 +127,28 @@ def gather(
         counts = [SourceCounts(**each) for each in gathered["sources"]]
     else:
         refuse_existing(out)
-        counts = _gathered(request, workers, flow)
+        snapshots = _snapshots(request)
+        request = replace(request, learned={name: str(path) for name, path in snapshots.items()})
+        with answers_of(request, workers, flow) as (answers, counts):
+            library = library_of(settings.vehicle, answers)
+            save_library(out, library, {"asked": asked, "sources": [each._asdict() for each in counts]})
+        for path in snapshots.values():
+            remove(path)
+    warn_if_short(counts, plans)
+    return counts
+
+
+def _snapshots(request: GatherRequest) -> dict[str, Path]:
+    """What was learned until now in the data folders among the sources; until the library is there."""
+    vehicle = request.settings.vehicle
+    name = f"gather-{digest_of(str(request.out.absolute()))[:8]}"
+    return {
+        each: snapshot_of_questions(each, vehicle, name) for each in request.sources if is_data_folder(each)
+    }
+
+
+def warn_if_short(counts: Sequence[SourceCounts], plans: int) -> None:
+    """Warn if fewer questions were answered than wanted."""
     answered = sum(each.answered for each in counts)
     if answered < plans:
         _LOG.warning(
@@ -129,7 +156,6 @@ def gather(
             "plans; give more sources to get more.",
             *(answered, sum(each.questions for each in counts), plans),
         )
-    return counts
 
 
 def check_asked_questions(plans: int, poses: float, difficulty: str, sources: Sequence[str]) -> None:
@@ -171,7 +197,24 @@ def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
     return {**totals, "driving_seconds": driving, **{name: float(plans) for name, plans in own.items()}}
 
 
-def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> list[SourceCounts]:
+@contextmanager
+def answers_of(
+    request: GatherRequest, workers: int, flow: GatherFlow | None
+) -> Iterator[tuple[list[Answered], list[SourceCounts]]]:
+    """Answer the questions of a request, or those that a killed command has left.
+
+    Args:
+        request: the questions.
+        workers: number of worker processes.
+        flow: gathers in worker processes, as for ``gather``.
+
+    Yields:
+        the answers, and what came of each source. The pieces on the disk are removed at the end of the
+        context, unless it ends with an error.
+
+    Raises:
+        RunError: no question could be answered.
+    """
     with unfinished(request.out):
         if flow is None or workers == 1 or request.plans <= FEW_PLANS:
             results = gather_pieces(request, partial(do_here, GATHER))
@@ -184,10 +227,20 @@ def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> 
             none = f"None of the {tried.total()} questions was answered"
             none = none if tried else "There is no room for a question"
             raise RunError(f"{none}; give easier or other sources.")
-        counts = _counted(request, kept, tried)
-        _save(request, kept, counts)
+        yield kept, _counted(request, kept, tried)
         remove_parts(request.out)
-    return counts
+
+
+def library_of(vehicle: Vehicle, answers: Sequence[Answered]) -> PlanLibrary:
+    """The library of some answers."""
+    questions = [each.variants[0].problem for each in answers]
+    classes = {question.class_name for question in questions}
+    return gathered_library(
+        classes.pop() if len(classes) == 1 else "general",
+        vehicle,
+        [(plan.problem.id, plan.plan) for each in answers for plan in each.variants],
+        tuple(sorted({question.scale for question in questions})),
+    )
 
 
 def _kept(request: GatherRequest, results: Sequence[Gathered]) -> tuple[list[Answered], Counter[int]]:
@@ -216,18 +269,5 @@ def _counted(request: GatherRequest, kept: Sequence[Answered], tried: Counter[in
         own = [each.variants for each in kept if each.source == number]
         driving_s = fmean(best.plan.duration_s for best, *_ in own) if own else None
         plans = sum(map(len, own))
-        counts.append(SourceCounts(shown_name(name), tried[number], len(own), plans, driving_s))
+        counts.append(SourceCounts(Path(name).name, tried[number], len(own), plans, driving_s))
     return counts
-
-
-def _save(request: GatherRequest, kept: Sequence[Answered], counts: Sequence[SourceCounts]) -> None:
-    questions = [each.variants[0].problem for each in kept]
-    classes = {question.class_name for question in questions}
-    library = gathered_library(
-        classes.pop() if len(classes) == 1 else "general",
-        request.settings.vehicle,
-        [(plan.problem.id, plan.plan) for each in kept for plan in each.variants],
-        tuple(sorted({question.scale for question in questions})),
-    )
-    sources = [each._asdict() for each in counts]
-    save_library(request.out, library, {"asked": request.asked, "sources": sources})

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -27,7 +27,15 @@ from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import digest_of, key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.part_folder import NumberedPiece, is_readable
-from tasks.requests.question_sources import Asked, QuestionSource, is_drawn, named_source, question_source
+from tasks.requests.question_sources import (
+    QuestionSource,
+    Share,
+    is_data_folder,
+    is_drawn,
+    named_source,
+    question_source,
+    turn_of,
+)
 
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
@@ -41,26 +49,31 @@ GIVE_UP: Final = 5  # questions asked for each wanted plan
 class GatherRequest:
     """Which questions to ask, and how many answers to keep."""
 
-    sources: tuple[str, ...]  # names of classes and families, and paths
+    sources: tuple[str, ...]  # as they are asked for: names of classes and families, and paths
     out: Path  # the library
     plans: int
     poses: float  # the share of drawn questions that ask for a pose
     difficulty: str  # of classes and families
     settings: ImportSettings
-    asked_of: Asked = "all"  # which questions of the sources
+    share: Share = "all"  # which questions of the sources
+    learned: Mapping[str, str] = field(default_factory=dict, hash=False)  # data folder: its snapshot's path
 
     @functools.cached_property
     def asked(self) -> str:
-        """A digest of all that a command asks for."""
+        """A digest of all that a command asks for; whatever was learned in a data folder is the same."""
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
-        contents = ["" if is_drawn(name) else named_source(name).digest() for name in self.sources]
-        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents, self.asked_of)
+        contents = {
+            name: named_source(name).digest()
+            for name in self.sources
+            if not (is_drawn(name) or is_data_folder(name) or name in self.learned)
+        }
+        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents, self.share)
 
     @functools.cached_property
     def digest(self) -> str:
         """A digest of all that decides which question has which number, and what is kept of its answer."""
-        return key_of("gather", self.asked)
+        return key_of("gather", self.asked, dict(self.learned))
 
 
 @dataclass(frozen=True)
@@ -86,8 +99,8 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     sources, vehicle, workspace = read_sources(request), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
     for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
-        source, own = sources[number % len(sources)], number // len(sources)
-        drawn = source.draw(own) if own < source.most else None
+        source, own = turn_of(sources, number)
+        drawn = source.question(own)
         if drawn is None:
             continue
         question = to_canonical(drawn)[0]
@@ -158,8 +171,8 @@ def read_sources(request: GatherRequest) -> list[QuestionSource]:
 
 @functools.lru_cache(maxsize=1)
 def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
-    how = (request.plans, request.poses, request.difficulty, request.settings, request.asked_of)
-    return [question_source(name, *how) for name in request.sources]
+    how = (request.plans, request.poses, request.difficulty, request.settings, request.share)
+    return [question_source(request.learned.get(name, name), *how) for name in request.sources]
 
 
 def stored_variants(
@@ -174,7 +187,7 @@ def stored_variants(
         vehicle: who drives.
         seed: of the search.
         workspace: the buffers of this thread.
-        known: a plan that answers the question already. It is kept where nothing better is found.
+        known: a plan that answers the question already. It is kept unless a better one is found.
     """
     ask = partial(solve, question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
     found = ask(polished=False).plan
@@ -183,6 +196,8 @@ def stored_variants(
     elif question.arrival is None:
         best = polish(question, found, vehicle, scene_of(question), workspace, margin_m=MARGIN_M).plan
         variants = worth_storing(found, best, vehicle)
+        if known is not None and cost_of(known, vehicle) < cost_of(variants[0], vehicle):
+            variants.insert(0, known)  # closer to obstacles: the other fits more questions
     else:  # it may be in a tight slot: no margin
         further = 0 if trailers_of(vehicle) else EFFORT.further  # with trailers an expansion takes longer
         best = ask(limits=replace(EFFORT, further=further)).plan

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from planners.maps.questions import question_in
+from planners.world.alignment import to_canonical
 from planners.world.classes.families import FAMILIES, Family, class_or_family
 from planners.world.classes.problem_classes import CLASSES, ProblemClass
 from planners.world.problem import Plan, Problem
@@ -22,16 +22,14 @@ from storage.fields import nearest
 from storage.places.data_folder import MARK
 from storage.places.mirror import is_remote
 from storage.tables.experiences import holds_experiences, read_experiences
-from storage.tables.gained_experiences import SNAPSHOTS
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Source, source_at
-from tasks.inputs.gained_on_the_job import snapshot_of_questions
+from tasks.inputs.gained_on_the_job import question_digest
 from tasks.settings.errors import UsageError
 
 OWN_SEEDS: Final = 1 << 32  # larger than any seed with which users draw problems
-LEARNED: Final = "learned"  # how what was learned is called in tables
 HELD_BACK: Final = 4  # of a file's questions one in so many is held back for judging
-Asked = Literal["all", "train", "test"]  # questions of a file: all, those to learn from, those held back
+Share = Literal["all", "train", "test"]  # questions of a file: all, those to learn from, those held back
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,10 @@ class QuestionSource:
     draw: Callable[[int], Problem | None]  # by number, from 0; None if there was no room for a question
     most: float = math.inf  # how many there are
     known: Callable[[int], Plan | None] = lambda number: None  # a plan that answers it, if one is known
+
+    def question(self, number: int) -> Problem | None:
+        """Its question of a number; None if there is none, or no room for one."""
+        return self.draw(number) if number < self.most else None
 
 
 def is_drawn(name: str) -> bool:
@@ -54,18 +56,14 @@ def first_of_problems(sources: Sequence[str]) -> Path | None:
     return next((each for each in files if each.suffix in FORMATS and each.is_file()), None)
 
 
-def settled_source(name: str, vehicle: Vehicle) -> str:
-    """The name of a source; for a data folder, the file of what a vehicle has learned there until now.
-
-    Raises StorageError if nothing was learned there.
-    """
-    is_data = not is_drawn(name) and (is_remote(name) or (Path(name) / MARK).is_file())
-    return str(snapshot_of_questions(name, vehicle)) if is_data else name
+def is_data_folder(name: str) -> bool:
+    """Whether a source is a data folder: what a vehicle has learned there."""
+    return not is_drawn(name) and (is_remote(name) or (Path(name) / MARK).is_file())
 
 
-def shown_name(name: str) -> str:
-    """The name of a source in tables."""
-    return LEARNED if Path(name).parent.name == SNAPSHOTS else Path(name).name
+def turn_of(sources: Sequence[QuestionSource], number: int) -> tuple[QuestionSource, int]:
+    """Whose turn it is at question ``number``, and the question's number there."""
+    return sources[number % len(sources)], number // len(sources)
 
 
 def drawn_source(name: str, difficulty: str, vehicle: Vehicle) -> ProblemClass | Family:
@@ -88,12 +86,12 @@ def named_source(name: str) -> Source:
 
 
 def is_held_back(question: Problem) -> bool:
-    """Whether a question of a file is for judging only, which its id decides."""
-    return int(hashlib.sha256(question.id.encode()).hexdigest(), 16) % HELD_BACK == 0
+    """Whether a question of a file is for judging only, which is decided by what it asks."""
+    return int(question_digest(to_canonical(question)[0]), 16) % HELD_BACK == 0
 
 
 def question_source(
-    name: str, plans: int, poses: float, difficulty: str, settings: ImportSettings, asked: Asked = "all"
+    name: str, plans: int, poses: float, difficulty: str, settings: ImportSettings, share: Share = "all"
 ) -> QuestionSource:
     """The questions of a source; the same arguments give the same ones.
 
@@ -103,40 +101,41 @@ def question_source(
         poses: the share of drawn questions that ask for a pose.
         difficulty: of a class or a family.
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
-        asked: which questions. None of those for learning is among those held back, whatever the seeds.
+        share: which questions; seeds below ``OWN_SEEDS`` draw none of those held back for learning.
 
     Raises:
         UsageError: the family is not for the vehicle.
         StorageError: the path does not exist or cannot be read.
     """
     vehicle = settings.vehicle
-    seed = (2 if asked == "test" else 1) * OWN_SEEDS + settings.seed
+    seed = (2 if share == "test" else 1) * OWN_SEEDS + settings.seed
     if is_drawn(name):
         drawn = drawn_source(name, difficulty, vehicle)
         draw = partial(drawn.draw, seed)
         return QuestionSource(draw) if name in FAMILIES else _asked_in(draw, poses, settings)
     source = named_source(name)
     if source.format == "problems" and source.path.is_file():
-        return _given(source.path, vehicle, asked)
+        return _given(source.path, vehicle, share)
     most = min(settings.count or plans, plans) if source.is_map else settings.count
-    imported = import_part(source, "test" if asked == "test" else "train", replace(settings, count=most))
+    imported = import_part(source, "test" if share == "test" else "train", replace(settings, count=most))
     worlds = imported.problems
     if not worlds:
+        use = "testing" if share == "test" else "training"
         raise StorageError(
-            f"{source.path} holds no usable world for training ({imported.explained()}); give another source."
+            f"{source.path} holds no usable world for {use} ({imported.explained()}); give another source."
         )
     return _asked_in(lambda number: worlds[number % len(worlds)], poses, settings)
 
 
-def _given(path: Path, vehicle: Vehicle, asked: Asked) -> QuestionSource:
+def _given(path: Path, vehicle: Vehicle, share: Share) -> QuestionSource:
     """The questions of a file of problems, or of one of experiences, whose plans are known."""
     questions: list[tuple[Problem, Plan | None]]
     if holds_experiences(path):
         questions = [(each.problem, each.plan) for each in read_experiences(path, vehicle)]
     else:
         questions = [(problem, None) for problem in read_problems(path, vehicle)]
-    if asked != "all":
-        questions = [each for each in questions if is_held_back(each[0]) == (asked == "test")]
+    if share != "all":
+        questions = [each for each in questions if is_held_back(each[0]) == (share == "test")]
     return QuestionSource(
         lambda number: questions[number][0], len(questions), lambda number: questions[number][1]
     )

@@ -30,11 +30,11 @@ from storage.archives.libraries import holds_plans
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
-from storage.places.mirror import folders_in, is_there
+from storage.places.mirror import files_in, folders_in, is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences, vehicle_of_experiences
-from storage.tables.gained_experiences import all_gained_shards
+from storage.tables.gained_experiences import all_gained_shards, snapshots
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
 from storage.vehicles.vehicle_files import said_vehicle
@@ -73,9 +73,9 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     data = open_data_folder(folder)
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
     for gained in data.gained_folders():
-        checks += [
-            partial(_experiences, path, VEHICLES.get(gained.name)) for path in all_gained_shards(gained)
-        ]
+        own = [*all_gained_shards(gained), *snapshots(gained)]
+        checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in own]
+    checks += [partial(_answers, path) for path in files_in(data.judged_libraries, "[!.]*.parquet")]
     checks += [
         partial(_library, path)
         for path in ([] if data.is_remote else folders_in(data.libraries))  # there they are no folders
@@ -97,6 +97,10 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
             "command that made them."
         )
     return checked
+
+
+def _answers(path: Path) -> Findings:
+    return Counter({"answers that libraries were judged by read": len(read_attempts(path))}), []
 
 
 def _run(check: Check) -> Findings:

@@ -33,7 +33,7 @@ from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.registry.champion_registry import FIRST, PROMOTED, REFUSED, Registry, Version
 from tasks.requests.question_sources import is_held_back
 from tasks.requests.verify_folder import verify_folder
-from tasks.settings.errors import UsageError
+from tasks.settings.errors import RunError, UsageError
 from tasks.tracking import mlflow_runs
 from tests.prepared.mlflow_database import with_mlflow_database
 
@@ -56,6 +56,8 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(folder))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     monkeypatch.setattr(task, "publish_judgements", lambda *_: None)  # no Prefect to tell
+    for each in (task, judging):
+        monkeypatch.setattr(each, "FEWEST", ASKED.test_problems)
     with_mlflow_database(folder)
     yield folder
     mlflow_runs.tracker.cache_clear()
@@ -193,6 +195,10 @@ def test_one_question_in_four_is_held_back() -> None:
         (["lots", "lot", "--poses", "2"], "--poses is 2"),
         (["lots", "lot", "--vehicle", "tram"], "Unknown vehicle 'tram'"),
         (["lots", "--difficulty", "hard"], "--difficulty is of classes and families"),
+        (["lots", "lot", "lot"], "lot is given twice"),
+        (["trap-car-1-trailer", "lot"], "trap-car-1-trailer is the name of a run's memory"),
+        (["lots", "lot", "--seed", "4294967296"], "Seed 4294967296: give one below"),
+        (["lots", "dock"], "dock"),
     ],
 )
 @pytest.mark.parametrize("command", ["retrain-library", "serve-library"])
@@ -204,6 +210,35 @@ def test_what_cannot_be_retrained_is_told_in_a_line_before_anything_is_written(
     assert error.count("\n") == 1
     assert told in error
     assert not (tmp_path / "data").exists()
+
+
+def test_two_questions_of_a_champion_decide_nothing(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _timed(monkeypatch, more_is_better=True)
+    few = ASKED._replace(test_problems=1)
+    _retrain(data, few)
+    _learn(data, 5, 4)
+    with pytest.raises(RunError, match="a verdict needs 4"):
+        task.retrain_library(data, few)
+    assert [each.name.split("-")[1] for each in (data / "libraries").iterdir()] == ["0001"]
+    assert _champion(data) == 1
+
+
+def test_a_question_that_was_learned_judges_under_whatever_name_it_is_asked(tmp_path: Path) -> None:
+    asked = [family("parallel").draw(5, index) for index in range(40)]
+    renamed = [replace(to_canonical(each)[0], id=f"job-{number}") for number, each in enumerate(asked)]
+    assert [*map(is_held_back, asked)] == [*map(is_held_back, renamed)]
+    assert 2 < sum(map(is_held_back, asked)) < 25
+
+
+def test_all_that_was_learned_is_in_a_library_that_is_gathered_anew(data: Path) -> None:
+    _learn(data, 5, 14)
+    made = _retrain(data)
+    names = {each.split("-")[0]: set() for each in load_library(made.folder).questions}
+    for each in load_library(made.folder).questions:
+        names[each.split("-")[0]].add(each)
+    drawn = [to_canonical(family("parallel").draw(5, index))[0] for index in range(14)]
+    assert len(names["perpendicular"]) == ASKED.plans
+    assert len(names["parallel"]) == sum(not is_held_back(each) for each in drawn)
 
 
 def test_without_sources_and_without_what_was_learned_there_is_nothing_to_gather(data: Path) -> None:
