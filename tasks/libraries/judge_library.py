@@ -41,7 +41,7 @@ PIECE: Final = 20  # questions
 NOTICED_S: Final = 0.05  # more plans cost milliseconds to look through, where manoeuvres take seconds
 FEWEST: Final = 20  # questions of a class that are judged apart; of fewer an interval says nothing
 OTHERS, ALL = "other questions", "all questions"
-ALONE, CHAMPION, CHALLENGER = "", "champion", "challenger"  # who answers
+ALONE, CHAMPION, CHALLENGER = "alone", "champion", "challenger"  # who answers
 HEADINGS: Final = ("with", "planning ms", "driving s", "solved %", "from memory %")
 FIELDS: Final = ("side", "planning_ms", "driving_s", "solved_percent", "from_memory_percent")
 FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers
@@ -66,9 +66,8 @@ class Judging:
     @functools.cached_property
     def digest(self) -> str:
         """A digest of everything that the attempts depend on."""
-        return key_of(
-            "judge library", self.questions.asked, [(each.name, each.digest) for each in self.sides]
-        )
+        sides = [(each.name, each.digest) for each in self.sides]
+        return key_of("judge library", self.questions.digest, sides)
 
 
 class SideFigures(NamedTuple):
@@ -139,7 +138,7 @@ def _figures(sides: Sequence[pd.DataFrame]) -> list[SideFigures]:
         name = str(side["run_id"].iloc[0])
         figures.append(
             SideFigures(
-                name or "alone",
+                name,
                 1e3 * float(side["planning_seconds"].mean()),
                 float(side["duration_s"][side["problem_id"].isin(solved)].mean()),
                 float(side["solved"].mean()),

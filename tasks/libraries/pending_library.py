@@ -17,9 +17,7 @@ from storage.vehicles.vehicle_files import label_of
 from storage.worlds.importing import ImportSettings
 from tasks.champions.new_experience import is_judged, next_number
 from tasks.registry.champion_registry import Registry, Version
-from tasks.requests.gather import (
-    check_asked_questions,
-)
+from tasks.requests.gather import check_asked_questions
 from tasks.requests.gather_pieces import GatherRequest
 from tasks.requests.question_sources import (
     OWN_SEEDS,
@@ -151,9 +149,8 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
     recipe, known = asked.recipe(), {each.tag("recipe") for each in (champion, *judged)}
     line = f"{asked.name}: champion is version {champion.number}; "
     line += f"{_counted(new, 'new question')} to learn from" if new else "nothing new was learned"
-    line += (
-        "" if recipe in known else f"{', and' if new else ', but'} it was not asked for in this way before"
-    )
+    if recipe not in known:
+        line += f"{', and' if new else ', but'} it was not asked for in this way before"
     is_anew = recipe != champion.tag("recipe")
     return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
 

@@ -63,12 +63,13 @@ class GatherRequest:
         """A digest of all that a command asks for; whatever was learned in a data folder is the same."""
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
-        contents = {
-            name: named_source(name).digest()
-            for name in self.sources
-            if not (is_drawn(name) or is_data_folder(name) or name in self.learned)
-        }
-        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents, self.share)
+        contents = ["" if self._is_open(name) else named_source(name).digest() for name in self.sources]
+        share = [] if self.share == "all" else [self.share]
+        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents, *share)
+
+    def _is_open(self, name: str) -> bool:
+        """Whether a source has no contents of its own, or has other ones each day."""
+        return is_drawn(name) or name in self.learned or is_data_folder(name)
 
     @functools.cached_property
     def digest(self) -> str:
