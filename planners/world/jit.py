@@ -12,14 +12,13 @@ import functools
 import hashlib
 import shutil
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
 from llvmlite import binding as llvm
 from numba.core import cgutils, event, types
-from numba.core.boxing import box_tuple
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -29,6 +28,7 @@ from numba.core.caching import (
 )
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.pythonapi import _boxers
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload, typeof_impl
@@ -129,12 +129,59 @@ _DEFAULTS: dict[str, Any] = Flags().values()
 _FLAGS_HASH = hash(Flags())  # of the names of the options alone, so it is the same for all
 
 
+def _boxed(kind: Any, value: Any, made: Any) -> Any:
+    """Make a kernel's result, a tuple with or without names, a tuple of Python.
+
+    Ctrl-C is noticed here, where classes of tuples are called. Numba's own code then goes on with what was
+    not made, and the process crashes.
+    """
+    from numba.core.boxing import box_tuple  # registers Numba's own: not before somebody compiles
+
+    api, builder = made.pyapi, made.builder
+    result = cgutils.alloca_once_value(builder, api.get_null_object())
+    items = box_tuple(kind, value, made)
+    with builder.if_else(api.c_api_error()) as (failed, whole):
+        with failed:
+            api.decref(items)
+        with whole:
+            own = getattr(kind, "instance_class", None)
+            if own is not None:
+                named = made.env_manager.read_const(made.env_manager.add_const(own))
+                builder.store(api.call(named, items), result)
+                api.decref(items)
+            else:
+                builder.store(items, result)
+    return builder.load(result)
+
+
+_TUPLES = (types.Tuple, types.UniTuple, types.NamedTuple, types.NamedUniTuple)
+
+
+@contextlib.contextmanager
+def _own_boxes() -> Iterator[None]:
+    """Let what is compiled meanwhile make tuples by ``_boxed``; nobody else compiles at that time."""
+    from numba.core import boxing  # noqa: F401 registers Numba's own
+
+    boxes: Any = _boxers.functions
+    with global_compiler_lock:
+        usual = {kind: boxes[kind] for kind in _TUPLES}
+        boxes.update(dict.fromkeys(_TUPLES, _boxed))
+        try:
+            yield
+        finally:
+            boxes.update(usual)
+
+
 class _KernelCompiler(Compiler):
-    """Compiles a kernel, with flags that are compared quickly."""
+    """Compiles a kernel, with flags that are compared quickly and results that Ctrl-C may interrupt."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        with _own_boxes():
+            return super().compile_extra(func)
 
 
 class _LinkedLibrary(JITCodeLibrary):
@@ -234,33 +281,6 @@ class _Kernel(CPUDispatcher):
         for environment in cres._find_referenced_environments():
             cres.codegen.set_env(environment.env_name, environment)
         super().add_overload(cres)
-
-
-def _boxed(kind: Any, value: Any, made: Any) -> Any:
-    """Make a kernel's result, a tuple with or without names, a tuple of Python.
-
-    Ctrl-C is noticed here, where classes of tuples are called. Numba's own code then goes on with what was
-    not made, and the process crashes.
-    """
-    api, builder = made.pyapi, made.builder
-    result = cgutils.alloca_once_value(builder, api.get_null_object())
-    items = box_tuple(kind, value, made)
-    with builder.if_else(api.c_api_error()) as (failed, whole):
-        with failed:
-            api.decref(items)
-        with whole:
-            own = getattr(kind, "instance_class", None)
-            if own is not None:
-                named = made.env_manager.read_const(made.env_manager.add_const(own))
-                builder.store(api.call(named, items), result)
-                api.decref(items)
-            else:
-                builder.store(items, result)
-    return builder.load(result)
-
-
-_boxes: Any = _boxers.functions
-_boxes.update(dict.fromkeys((types.Tuple, types.UniTuple, types.NamedTuple, types.NamedUniTuple), _boxed))
 
 
 def _is_kernel(event: event.Event) -> bool:
