@@ -34,6 +34,10 @@ ELSEWHERE: Final = {  # first words of commands that are only parsed (test_comma
     "export data": RUN,
     **dict.fromkeys(("retrain", "promote", "rollback"), "needs champions: tests/tasks/champions"),
     "retrain-library": "needs minutes: tests/tasks/libraries",
+    **dict.fromkeys(
+        ("draw yard --difficulty hard --vehicle car-1-trailer --problems 160", "solve yards.jsonl"),
+        "an example that takes minutes",
+    ),
     "gather lot data": "needs what was learned: tests/tasks/requests/test_gather.py",
     **dict.fromkeys(("serve", "serve-library", "serve-memory", "servers", "dashboard"), SERVES),
     "plan problem.json --vehicle jackal.yaml --memory": "needs a run of it: test_stages_of_vehicles.py",
