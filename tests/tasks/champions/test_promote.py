@@ -12,7 +12,7 @@ import pytest
 from storage.archives.memories import save_memory
 from storage.places.data_folder import open_data_folder
 from tasks.champions.conclude import settle
-from tasks.champions.new_experience import runs_to_make
+from tasks.champions.new_experience import next_number, runs_to_make
 from tasks.champions.promote import ChampionChange, promote, promote_awaiting, roll_back
 from tasks.registry.champion_registry import (
     AWAITING,
@@ -238,3 +238,23 @@ def test_a_registry_that_was_opened_before_anything_was_logged_sees_what_is_regi
     assert early.names() == []
     logged.copied(tmp_path / "data").version("one")
     assert early.names() == [NAME]
+
+
+def test_a_library_is_rolled_back_by_its_name_alone_and_counts_its_own_retrainings(
+    registered: Registered,
+) -> None:
+    registry, data = registered.registry, registered.data
+    bus = "motion-memory-lots-bus"
+    for number in (1, 2):
+        version = registered.version(str(number), bus, recipe="r", retraining=number, verdict=PROMOTED)
+        registry.set_tags(version, {"previous": number - 1} if number > 1 else {})
+        registry.set_alias(version)
+    assert (next_number(registry, bus), next_number(registry)) == (3, 1)
+    with pytest.raises(RunError, match="to roll back to"):
+        roll_back(data, None)
+    registry.set_alias(registered.version("tram", "motion-memory-lots-tram", recipe="r", verdict=FIRST))
+    with pytest.raises(RunError, match="motion-memory-lots-bus, motion-memory-lots-tram"):
+        roll_back(data, "lots")
+    assert roll_back(data, "lots-bus") == [ChampionChange(bus, before=2, now=1)]
+    with pytest.raises(RunError, match="to roll back to"):
+        roll_back(data, "lots-tram")
