@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from cyclopts import Parameter
 
 from flows.cli.choices import Difficulty
-from flows.cli.run_options import worker_count
+from flows.cli.run_options import Flag, worker_count
 from flows.cli.solve_options import MapOptions
 from flows.cli.terminal import SHORT, write, write_answer, write_files
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from tasks.libraries.pending_library import LibraryRetraining
 
 ENTRYPOINT: Final = "flows.cli.scheduled.retrain_library"
-Flag = Annotated[bool, Parameter(negative=())]
 
 
 @Parameter(name="*")
@@ -79,13 +78,13 @@ def retrain_library(
     from tasks.session.folder_lock import locked_folder
     from tasks.settings.environment import default_data
 
-    data = options.data or default_data()
+    data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
     if dry_run:
         from tasks.libraries.pending_library import library_dry_run
 
-        write(library_dry_run(data, _asked(name, sources or [], options, reading)))
+        write(library_dry_run(data, asked))
         return 0
-    given = _parameters(name, sources or [], options, reading)
+    given = _parameters(asked, options, reading)
     with locked_folder(data) as folder, local_server(folder.path) as server:
         from flows.retrain_library import retrain_library as flow  # late: Prefect reads its environment
 
@@ -126,12 +125,9 @@ def serve_library(
     from tasks.champions.retraining_schedule import serve
     from tasks.settings.environment import default_data
 
-    given = _parameters(name, sources or [], options, reading)
-    data, registered = (
-        options.data or default_data(),
-        _asked(name, sources or [], options, reading).registered,
-    )
-    serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, registered, on_drift=False)
+    data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
+    given = _parameters(asked, options, reading)
+    serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, on_drift=False)
 
 
 def retrain_library_flow() -> Flow[..., Any]:
@@ -141,12 +137,9 @@ def retrain_library_flow() -> Flow[..., Any]:
     return retrain_library
 
 
-def _parameters(
-    name: str, sources: list[str], options: LibraryOptions, reading: MapOptions
-) -> dict[str, Any]:
+def _parameters(asked: LibraryRetraining, options: LibraryOptions, reading: MapOptions) -> dict[str, Any]:
     """The parameters of the flow, but for the data folder; paths are absolute."""
-    asked = _asked(name, sources, options, reading)  # raises UsageError before anything starts
-    given = asdict(options) | asdict(reading) | {"name": name, "sources": list(asked.sources)}
+    given = asdict(options) | asdict(reading) | {"name": asked.name, "sources": list(asked.sources)}
     del given["data"]
     vehicle = Path(options.vehicle)
     given["vehicle"] = str(vehicle.absolute()) if vehicle.suffix else options.vehicle
@@ -154,6 +147,7 @@ def _parameters(
 
 
 def _asked(name: str, sources: list[str], options: LibraryOptions, reading: MapOptions) -> LibraryRetraining:
+    """What is asked for; raises UsageError before anything starts."""
     from tasks.libraries.pending_library import library_retraining
     from tasks.requests.import_worlds import import_settings
 

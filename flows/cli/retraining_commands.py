@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
-from cyclopts import Parameter
-
-from flows.cli.run_options import Options, worker_count
+from flows.cli.run_options import Flag, Options, worker_count
 from flows.cli.stage_commands import settings_of
 from flows.cli.terminal import write, write_answer
 
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
 
 NO_OPTIONS: Final = Options()
 ENTRYPOINT: Final = "flows.cli.scheduled.retrain"
-Flag = Annotated[bool, Parameter(negative=())]
 
 
 def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = NO_OPTIONS) -> None:

@@ -22,6 +22,8 @@ _LEARNING: Final = (
     "network",
 )  # fmt: skip
 
+Flag = Annotated[bool, Parameter(negative=())]  # an option without a value
+
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)

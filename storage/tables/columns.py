@@ -62,11 +62,8 @@ def _in_motion(problem: Problem, motion: tuple[float, ...], fields: dict[str, An
     lists = {name: tuple(fields[name]) for name in ("hitches", "hitch_tolerances")}
     arrival = Arrival(**fields | lists)
     numbers = (arrival.heading or 0.0, arrival.heading_tolerance, *arrival.hitches, *arrival.hitch_tolerances)
-    if (
-        not all(map(math.isfinite, numbers))
-        or math.isnan(arrival.least_speed)
-        or math.isnan(arrival.most_speed)
-    ):
+    speeds = arrival.least_speed, arrival.most_speed  # any: infinite
+    if not all(map(math.isfinite, numbers)) or any(map(math.isnan, speeds)):
         raise ValueError(f"the arrival of problem {short(problem.id)} is not one of numbers")
     return replace(problem, start_motion=motion, arrival=arrival)
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
+from typing import Final
 
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from storage.archives.libraries import how_gathered, load_library, save_library
@@ -23,7 +24,7 @@ from tasks.requests.gather import (
 )
 from tasks.requests.question_sources import is_held_back
 
-LEARNED = "learned"  # the name of a source
+LEARNED: Final = "learned"  # the name of a source
 
 
 def make_challenger(

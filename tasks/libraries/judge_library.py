@@ -125,10 +125,14 @@ def judged(rows: pd.DataFrame) -> LibraryJudgement:
     alone, champion, challenger = (alike[alike["run_id"] == side] for side in (ALONE, CHAMPION, CHALLENGER))
     against = judge(champion, challenger, noticed_s=NOTICED_S) if len(champion) else None
     if against is not None and against.problems < FEWEST:
-        told = f"a verdict needs {FEWEST} held-back questions, and there are only {against.problems}"
-        against = against._replace(passes=False, why=told)
+        against = against._replace(passes=False, why=too_few(against.problems))
     sides = _figures([side for side in (alone, champion, challenger) if len(side)])
     return LibraryJudgement(judge(alone, challenger, noticed_s=NOTICED_S), against, sides)
+
+
+def too_few(count: int) -> str:
+    """Why ``count`` questions decide nothing."""
+    return f"a verdict needs {FEWEST} held-back questions, and there are only {count}"
 
 
 def _figures(sides: Sequence[pd.DataFrame]) -> list[SideFigures]:

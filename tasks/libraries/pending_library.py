@@ -10,7 +10,7 @@ from planners.world.classes.problem_classes import CLASSES
 from planners.world.vehicles.vehicle import VEHICLES
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
-from storage.places.mirror import fetch, is_remote, local_place
+from storage.places.mirror import fetch, local_place
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import read_gained, snapshot_ids
 from storage.vehicles.vehicle_files import label_of
@@ -99,19 +99,19 @@ def library_retraining(
     if settings.seed >= OWN_SEEDS:
         raise UsageError(f"Seed {settings.seed}: give one below {OWN_SEEDS:,}; those above draw what judges.")
     for each in sources:
-        if is_drawn(each):
-            drawn_source(each, difficulty, settings.vehicle)
-        elif not is_remote(each):
-            named_source(each)
-    own = [each if is_drawn(each) or is_remote(each) else str(Path(each).absolute()) for each in sources]
-    for each in own:
-        if own.count(each) > 1:
-            raise UsageError(f"{each} is given twice: name each source once.")
         if is_data_folder(each):
             raise UsageError(
                 f"{each} is a data folder: what was learned in that of --data is a source in any case, and "
                 "no other can be one."
             )
+        if is_drawn(each):
+            drawn_source(each, difficulty, settings.vehicle)
+        else:
+            named_source(each)
+    own = [each if is_drawn(each) else str(Path(each).absolute()) for each in sources]
+    for each in own:
+        if own.count(each) > 1:
+            raise UsageError(f"{each} is given twice: name each source once.")
     return LibraryRetraining(*(name, tuple(own), plans, poses, difficulty, settings, test_problems, approve))
 
 

@@ -30,6 +30,7 @@ from tasks.libraries.judge_library import (
     judge_library,
     questions_of,
     sides_table,
+    too_few,
 )
 from tasks.libraries.pending_library import LibraryRetraining, PendingLibrary, pending_library
 from tasks.registry.champion_registry import Registry, Version
@@ -206,8 +207,8 @@ def _held_back(
     count = len(questions_of(request))
     if count < FEWEST and not is_first:
         raise RunError(
-            f"{_counted(count, 'question')} held back to judge {asked.name} by, and a verdict needs "
-            f"{FEWEST}: raise --test-problems, or name a class, a family, a map or worlds among its sources."
+            f"{asked.name}: {too_few(count)}; raise --test-problems, or name a class, a family, a map or "
+            "worlds among its sources."
         )
     return request
 
@@ -261,7 +262,3 @@ def _log_judgement(
         file = scratch / "verdict.md"
         file.write_text(markdown, encoding="utf-8")
         log.artifacts(run_id, file)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count:,} {what} is" if count == 1 else f"{count:,} {what}s are"

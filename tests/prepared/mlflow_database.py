@@ -8,9 +8,19 @@ import warnings
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
 from storage.places.data_folder import open_data_folder
 from tasks.tracking.mlflow_database import OWNER_ONLY, ready_database
 from tests.prepared.made_once import made_once
+
+LOUD_LIBRARIES = pytest.mark.filterwarnings(  # of MLflow's libraries among themselves
+    "ignore:.*type hint:UserWarning",
+    "ignore:Operation with range",
+    "ignore::DeprecationWarning",
+    "ignore::FutureWarning",
+    "ignore::ResourceWarning",
+)
 
 
 def _make(home: Path) -> Path:

@@ -23,20 +23,11 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages import build_memory, hallucinate
 from tasks.stages.judge import judged
 from tasks.tracking import mlflow_runs
-from tests.prepared.mlflow_database import with_mlflow_database
+from tests.prepared.mlflow_database import LOUD_LIBRARIES, with_mlflow_database
 from tests.tasks.champions.retrained import CLASS, SETTINGS, timed_by_work
 from tests.tasks.champions.retraining_story import Story
 
-pytestmark = [
-    pytest.mark.timeout(600),
-    pytest.mark.filterwarnings(  # of MLflow's libraries among themselves
-        "ignore:.*type hint:UserWarning",
-        "ignore:Operation with range",
-        "ignore::DeprecationWarning",
-        "ignore::FutureWarning",
-        "ignore::ResourceWarning",
-    ),
-]
+pytestmark = [pytest.mark.timeout(600), LOUD_LIBRARIES]
 
 
 @pytest.fixture(scope="module")

@@ -25,17 +25,11 @@ from tasks.registry.champion_registry import (
 )
 from tasks.settings.errors import RunError
 from tasks.settings.presets import for_preset
-from tests.prepared.mlflow_database import with_mlflow_database
+from tests.prepared.mlflow_database import LOUD_LIBRARIES, with_mlflow_database
 from tests.storage.samples import a_memory
 
 NAME = "motion-memory-trap"
-pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
-    "ignore:.*type hint:UserWarning",
-    "ignore:Operation with range",
-    "ignore::DeprecationWarning",
-    "ignore::FutureWarning",
-    "ignore::ResourceWarning",
-)
+pytestmark = LOUD_LIBRARIES
 
 
 class Registered:

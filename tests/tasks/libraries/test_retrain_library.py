@@ -37,18 +37,9 @@ from tasks.requests.question_sources import is_held_back
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.errors import RunError, UsageError
 from tasks.tracking import mlflow_runs
-from tests.prepared.mlflow_database import with_mlflow_database
+from tests.prepared.mlflow_database import LOUD_LIBRARIES, with_mlflow_database
 
-pytestmark = [
-    pytest.mark.timeout(600),
-    pytest.mark.filterwarnings(  # of MLflow's libraries among themselves
-        "ignore:.*type hint:UserWarning",
-        "ignore:Operation with range",
-        "ignore::DeprecationWarning",
-        "ignore::FutureWarning",
-        "ignore::ResourceWarning",
-    ),
-]
+pytestmark = [pytest.mark.timeout(600), LOUD_LIBRARIES]
 ASKED: Final = LibraryRetraining("slots", ("perpendicular",), 3, 0.25, "standard", ImportSettings(), 4, False)
 
 
