@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:  # its import takes half a second, and who reads rows needs only the names
     from planners.world.problem import Plan
@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # its import takes half a second, and who reads rows needs on
 WITHOUT_MEMORY = ("none", "fresh")  # the assists whose top k is 0
 SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a library or from a memory ...
 DRIVES = "drives"  # ... if a whole plan was moved to the problem
+FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers that a memory gave
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,15 @@ they would in at most one case of a thousand if all were as in the benchmark: ra
 that nobody asked for. Polished answers are compared with polished ones of the benchmark. Where it has none
 (of planners that do not answer by default), total times at work are shorter, and only later ones than that
 count.
+
+A library answers questions of many kinds, none of them whole: there a hit is any answer from memory, and each
+class of questions is compared with what the library did in the held-back ones of that class.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -20,11 +23,14 @@ import pandas as pd
 from scipy.stats import fisher_exact, ttest_ind_from_stats
 
 from dashboards.statistics.panels import hits_of
+from planners.attempt import FROM_MEMORY
 from planners.world.arrays import Floats
 from storage.tables.configurations import POLISHED, configured
 
 SIGNIFICANCE: Final = 0.001  # of both tests together
 FEWEST: Final = 20  # problems; fewer never count as a fall
+OTHERS: Final = "other questions"  # of a library: those of classes of which too few are known
+LIBRARY_WAY: Final = ("lattice", "repair")  # planner and assist with which libraries are judged
 
 
 @dataclass(frozen=True)
@@ -110,12 +116,64 @@ class Drift:
 def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
     """How useful one memory was in ``attempts``, by planner and configuration: ``gust open 5 exhaustive``."""
     rows, _ = configured(attempts.assign(hit=hits_of(attempts)))
-    by_name = {}
-    for (planner, configuration), of_both in rows.groupby(["planner", "configuration"], observed=True):
-        hits = int(of_both["hit"].sum())
-        times = [of_both[column].to_numpy(float) for column in ("planning_seconds", "duration_s")]
-        by_name[f"{planner} {configuration}"] = usefulness_of(hits, *times)
-    return by_name
+    return {
+        f"{planner} {configuration}": _usefulness(of_both)
+        for (planner, configuration), of_both in rows.groupby(["planner", "configuration"], observed=True)
+    }
+
+
+def library_benchmark(judged: pd.DataFrame) -> dict[str, Usefulness]:
+    """How useful a library was in the ``judged`` attempts: in each class, and in all of them as ``OTHERS``.
+
+    A class with fewer than ``FEWEST`` questions is only part of the latter.
+    """
+    of_all = {_way(OTHERS): _hits_alone(_usefulness(_answers(judged)))} if len(judged) else {}
+    return of_all | _by_class(judged, judged["problem_class"].unique())
+
+
+def library_at_work(attempts: pd.DataFrame, benchmark: Collection[str]) -> dict[str, Usefulness]:
+    """How useful a library was in ``attempts``: in each class of its ``benchmark``, and in ``OTHERS``.
+
+    A class with fewer than ``FEWEST`` questions is part of the latter. Of these total times are left out, as
+    other questions take other times. Attempts in other ways than libraries are judged in do not count.
+    """
+    planner, assist = LIBRARY_WAY
+    alike = attempts[
+        (attempts["planner"] == planner) & (attempts["assist"] == assist) & attempts["polished"].astype(bool)
+    ]
+    known = [name for name in alike["problem_class"].unique() if _way(name) in benchmark]
+    by_class = _by_class(alike, known)
+    others = alike[[_way(name) not in by_class for name in alike["problem_class"]]]
+    of_others = {_way(OTHERS): _hits_alone(_usefulness(_answers(others)))} if len(others) else {}
+    return by_class | of_others
+
+
+def _by_class(attempts: pd.DataFrame, known: Collection[str]) -> dict[str, Usefulness]:
+    rows = _answers(attempts[attempts["problem_class"].isin(known)])
+    return {
+        _way(str(name)): _usefulness(of_class)
+        for name, of_class in rows.groupby("problem_class", observed=True)
+        if len(of_class) >= FEWEST
+    }
+
+
+def _way(questions: str) -> str:
+    """What events and pages call how a library answers some questions."""
+    return f"{' '.join(LIBRARY_WAY)}, {questions}"
+
+
+def _answers(attempts: pd.DataFrame) -> pd.DataFrame:
+    return attempts.assign(hit=attempts["source"].isin(FROM_MEMORY))
+
+
+def _hits_alone(figures: Usefulness) -> Usefulness:
+    return replace(figures, solved=0, total_s=0.0, total_sd_s=0.0)
+
+
+def _usefulness(rows: pd.DataFrame) -> Usefulness:
+    """How useful a memory was in ``rows``, whose column ``hit`` says where it was."""
+    times = [rows[column].to_numpy(float) for column in ("planning_seconds", "duration_s")]
+    return usefulness_of(int(rows["hit"].sum()), *times)
 
 
 def usefulness_of(hits: int, planning: Floats, driving: Floats) -> Usefulness:

@@ -112,7 +112,7 @@ def serve_library(
     options: LibraryOptions = _USUAL,
     reading: MapOptions = _AS_IT_IS,
 ) -> None:
-    """Retrain a library on a schedule, until Ctrl-C.
+    """Retrain a library on a schedule, and when hits have fallen, until Ctrl-C.
 
     Args:
         name: Name of the library.
@@ -122,12 +122,14 @@ def serve_library(
         options: How the library is gathered and judged, and where.
         reading: How maps are read.
     """
+    from tasks.champions.drift_watch import RESOURCE, RESOURCE_OF
     from tasks.champions.retraining_schedule import serve
     from tasks.settings.environment import default_data
 
     data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
     given = _parameters(asked, options, reading)
-    serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, on_drift=False)
+    drifting = {RESOURCE: f"{RESOURCE_OF}{asked.registered}/*"}
+    serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, drifting)
 
 
 def retrain_library_flow() -> Flow[..., Any]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import NamedTuple
 
-from dashboards.verdicts.drift import usefulness
+from dashboards.verdicts.drift import Usefulness, usefulness
 from dashboards.verdicts.promotion import (
     Judgement,
     judge,
@@ -82,6 +82,11 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
         raise RunError(" ".join(faults))
 
 
+def benchmark_tag(benchmark: Mapping[str, Usefulness]) -> str:
+    """The tag of a version that says how useful it was, by configuration, for who watches it at work."""
+    return json.dumps({name: asdict(figures) for name, figures in benchmark.items()})
+
+
 def settle(registry: Registry, judged_versions: Sequence[tuple[Version, str]]) -> list[str]:
     """Do what each verdict says, and note it.
 
@@ -119,7 +124,6 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
     markdown = _markdown(run, memory, verdict, judgement)
-    benchmark = usefulness(attempts.challenger)
     tags = {
         "memory": memory,
         "vehicle": settings.vehicle_label,
@@ -127,7 +131,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
         "learned": settings.learned,
         "retraining": number_of(settings.retraining),
         "digest": memory_digest(folder.memory(memory)),
-        "benchmark": json.dumps({name: asdict(figures) for name, figures in benchmark.items()}),
+        "benchmark": benchmark_tag(usefulness(attempts.challenger)),
         "against": "" if champion is None else champion.number,
     }
     if judgement is not None:

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from dashboards.verdicts.drift import Drift, Usefulness, drifts, usefulness
+from dashboards.verdicts.drift import Drift, Usefulness, drifts, library_at_work, usefulness
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.run_folder import RunFolder
@@ -31,8 +31,12 @@ SOLVED: Final = "motion-memory.solved"
 DRIFT: Final = "motion-memory.drift"
 _COLUMNS: Final = (
     *("planner", "assist", "top_k", "recall", "polished"),
-    *("hit", "source", "planning_seconds", "duration_s"),
+    *("hit", "source", "problem_class", "planning_seconds", "duration_s"),
 )
+RESOURCE: Final = "prefect.resource.id"  # the label of events that says of which memory they are ...
+RESOURCE_OF: Final = "motion-memory.memory."  # ... and how that begins
+RUN, LIBRARY = "run", "library"
+KIND: Final = "motion-memory.kind"  # the label of events that says which of these a memory is of
 _MODEL: Final = re.compile(r"models:/(?P<name>[^/@]+)(?:@(?P<alias>[^/]+)|/(?P<number>\d+))")
 
 
@@ -42,6 +46,7 @@ class BenchmarkedMemory(NamedTuple):
     name: str  # as events name it: ``name/version``, or ``run/memory``
     benchmark: Mapping[str, Usefulness]  # by planner and configuration
     data_folder: Path  # the folder that the memory belongs to
+    kind: str = RUN  # of memory: a run's, or a library
 
 
 def benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
@@ -76,7 +81,8 @@ def _registered(name: str, alias: str | None, number: str | None) -> Benchmarked
         return None
     figures = json.loads(version.tag("benchmark"))
     benchmark = {configuration: Usefulness(**values) for configuration, values in figures.items()}
-    return BenchmarkedMemory(f"{name}/{version.number}", benchmark, data_folder)
+    kind = LIBRARY if version.tag("recipe") else RUN
+    return BenchmarkedMemory(f"{name}/{version.number}", benchmark, data_folder, kind)
 
 
 def _of_run(folder: Path) -> BenchmarkedMemory | None:
@@ -91,17 +97,19 @@ def _of_run(folder: Path) -> BenchmarkedMemory | None:
     return BenchmarkedMemory(f"{run.name}/{memory_folder.name}", benchmark, run.parent.parent)
 
 
-def usefulness_at_work(rows: Path) -> dict[str, Usefulness]:
-    """How useful memories were in a file of attempts, by planner and configuration.
+def usefulness_at_work(memory: BenchmarkedMemory, rows: Path) -> dict[str, Usefulness]:
+    """How useful a memory was in a file of attempts, by planner and configuration.
 
     A file may hold problems of several kinds, which are answered by whole plans, by moved ones or by parts of
-    plans. Each is another configuration: what is recalled is part of it.
+    plans. For the memory of a run each is another configuration: what is recalled is part of it. For a
+    library, which is there for all of them, each class of questions is one.
 
     Args:
+        memory: the memory.
         rows: the file, .parquet.
     """
     attempts, _ = readable_attempts(rows, _COLUMNS)
-    return usefulness(attempts)
+    return library_at_work(attempts, memory.benchmark) if memory.kind == LIBRARY else usefulness(attempts)
 
 
 def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data: Path | None) -> list[str]:
@@ -126,7 +134,7 @@ def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data:
         return lines + ["no Prefect server received the event: `motion-memory serve` runs one"] * any_drifted
     url = server["PREFECT_API_URL"]
     try:
-        _send(server, comparisons)
+        _send(server, comparisons, memory.kind)
     except Exception as error:  # whatever fails in Prefect, the problems are solved
         reason = (str(error) or type(error).__name__).splitlines()[0]
         return [*lines, f"Prefect at {url} did not receive the events: {reason}"]
@@ -157,7 +165,7 @@ def _server(folders: Sequence[Path | None]) -> dict[str, str] | None:
     return None
 
 
-def _send(server: Mapping[str, str], comparisons: Sequence[Drift]) -> None:
+def _send(server: Mapping[str, str], comparisons: Sequence[Drift], kind: str) -> None:
     from prefect.artifacts import create_markdown_artifact
     from prefect.events import Event, Resource
     from prefect.events.clients import PrefectEventsClient
@@ -168,8 +176,9 @@ def _send(server: Mapping[str, str], comparisons: Sequence[Drift]) -> None:
     def event(name: str, drift: Drift) -> Any:
         resource = Resource(
             {
-                "prefect.resource.id": f"motion-memory.memory.{drift.memory}",
+                RESOURCE: f"{RESOURCE_OF}{drift.memory}",
                 "prefect.resource.name": drift.memory,
+                KIND: kind,
             }
         )
         return Event(event=name, resource=resource, payload=drift.to_json())

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import psutil
 
-from tasks.champions.drift_watch import DRIFT
+from tasks.champions.drift_watch import DRIFT, KIND, RUN
 from tasks.servers.prefect_server import local_server
 from tasks.session.folder_lock import locked_folder
 from tasks.settings.errors import UsageError
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 DAY: Final = 86_400.0
 NAME: Final = "scheduled"
+RUNS: Final = {KIND: RUN}  # drift events of memories of runs
 QUERY_SECONDS: Final = 2.0  # between two queries to the server
 CRON_FIELDS: Final = 5
 END_SECONDS: Final = 5.0  # how long a retraining may take to end after Ctrl-C before it is killed
@@ -44,7 +45,7 @@ def serve(
     every: float | None,
     cron: str | None,
     name: str = NAME,
-    on_drift: bool = True,
+    drifting: Mapping[str, str] = RUNS,
 ) -> None:
     """Retrain on a schedule until Ctrl-C, one retraining at a time.
 
@@ -56,7 +57,7 @@ def serve(
         every: seconds from one retraining to the next; a day if neither this nor ``cron`` is given.
         cron: when to retrain, as a cron expression.
         name: of the deployment; one of a name is served at a time.
-        on_drift: whether to retrain also when hits have fallen.
+        drifting: labels of the drift events that start a retraining, too, with their values.
 
     Raises:
         UsageError: both ``every`` and ``cron`` are given, or one of them is not a schedule.
@@ -67,14 +68,13 @@ def serve(
         data_path = folder.path
     with local_server(data_path) as server:
         deployment = _deployment(
-            flow(), entrypoint, schedule, {**parameters, "data": str(data_path)}, name, on_drift
+            flow(), entrypoint, schedule, {**parameters, "data": str(data_path)}, name, drifting
         )
         if server is not None:
             server.wait()
             _LOG.info(str(server))
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
-        fallen = ", and whenever hits have fallen" if on_drift else ""
-        _LOG.info("retrains %s%s; Ctrl-C ends it", when, fallen)
+        _LOG.info("retrains %s, and whenever hits have fallen; Ctrl-C ends it", when)
         try:
             _run(deployment)
         finally:
@@ -130,13 +130,16 @@ def _deployment(
     schedule: dict[str, Any],
     parameters: dict[str, Any],
     name: str,
-    on_drift: bool,
+    drifting: Mapping[str, str],
 ) -> RunnerDeployment:
-    """A deployment that retrains on the schedule and, if so asked, whenever a drift event arrives."""
+    """A deployment that retrains on the schedule, and whenever a drift event with some labels arrives."""
     from prefect.deployments.runner import RunnerDeployment
-    from prefect.events import DeploymentEventTrigger
+    from prefect.events import DeploymentEventTrigger, ResourceSpecification
     from prefect.types.entrypoint import EntrypointType
 
+    trigger = DeploymentEventTrigger(
+        name="retrain when hits have fallen", expect={DRIFT}, match=ResourceSpecification({**drifting})
+    )
     try:
         deployment = RunnerDeployment.from_flow(
             flow,
@@ -144,8 +147,7 @@ def _deployment(
             **schedule,
             parameters=parameters,
             tags=["motion-memory", "retraining"],
-            triggers=[DeploymentEventTrigger(name="retrain when hits have fallen", expect={DRIFT})]
-            * on_drift,
+            triggers=[trigger],
             entrypoint_type=EntrypointType.MODULE_PATH,
         )
     except ValueError as error:  # how Prefect refuses a cron expression

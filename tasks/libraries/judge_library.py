@@ -14,8 +14,9 @@ from typing import Final, NamedTuple
 import pandas as pd
 
 from dashboards.cells import NOTHING, CellTable, decimal, percent
+from dashboards.verdicts.drift import FEWEST, LIBRARY_WAY, OTHERS, Usefulness, library_benchmark
 from dashboards.verdicts.promotion import Judgement, judge
-from planners.attempt import Attempt
+from planners.attempt import FROM_MEMORY, Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.search.query import usual_limits
 from planners.solve import solve
@@ -31,20 +32,18 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.side_by_side import in_turn
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.gather_pieces import COLLECTOR, GIVE_UP, GatherRequest, read_sources
+from tasks.requests.gather_pieces import GIVE_UP, GatherRequest, read_sources
 from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unfinished
 from tasks.requests.question_sources import turn_of
 
-ASSIST: Final = "repair"  # the usual one with a memory
+PLANNER, ASSIST = LIBRARY_WAY
 TOP_K: Final = 5
 PIECE: Final = 20  # questions
 NOTICED_S: Final = 0.05  # more plans cost milliseconds to look through, where manoeuvres take seconds
-FEWEST: Final = 20  # questions of a class that are judged apart; of fewer an interval says nothing
-OTHERS, ALL = "other questions", "all questions"
+ALL: Final = "all questions"
 ALONE, CHAMPION, CHALLENGER = "alone", "champion", "challenger"  # who answers
 HEADINGS: Final = ("with", "planning ms", "driving s", "solved %", "from memory %")
 FIELDS: Final = ("side", "planning_ms", "driving_s", "solved_percent", "from_memory_percent")
-FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers
 
 
 class Side(NamedTuple):
@@ -86,6 +85,7 @@ class LibraryJudgement(NamedTuple):
     alone: Judgement
     champion: Judgement | None  # None if there is no champion
     sides: list[SideFigures]  # what each of them did
+    benchmark: dict[str, Usefulness]  # how useful the library is, for who watches it at work
 
 
 def judge_library(judging: Judging) -> LibraryJudgement:
@@ -127,7 +127,10 @@ def judged(rows: pd.DataFrame) -> LibraryJudgement:
     if against is not None and against.problems < FEWEST:
         against = against._replace(passes=False, why=too_few(against.problems))
     sides = _figures([side for side in (alone, champion, challenger) if len(side)])
-    return LibraryJudgement(judge(alone, challenger, noticed_s=NOTICED_S), against, sides)
+    beside_alone = judge(alone, challenger, noticed_s=NOTICED_S)
+    return LibraryJudgement(
+        beside_alone, against, sides, library_benchmark(rows[rows["run_id"] == CHALLENGER])
+    )
 
 
 def too_few(count: int) -> str:
@@ -202,7 +205,7 @@ def judge_piece(piece: JudgedPiece) -> None:
     def attempt(question: Problem, number: int) -> Attempt:
         library = sides[number][1]
         return solve(
-            *(question, COLLECTOR, "none" if library is None else ASSIST, TOP_K, library, seed),
+            *(question, PLANNER, "none" if library is None else ASSIST, TOP_K, library, seed),
             usual_limits(question),
             vehicle=vehicle,
             workspace=workspace,

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dashboards.cells import CellTable, as_markdown
+from dashboards.verdicts.drift import FEWEST
 from dashboards.verdicts.promotion import judgement_line, judgement_markdown, judgement_tables
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
 from storage.tables.gained_experiences import gained_shards
 from storage.vehicles.vehicle_files import label_of
-from tasks.champions.conclude import settle, summary_of, verdict_on
+from tasks.champions.conclude import benchmark_tag, settle, summary_of, verdict_on
 from tasks.champions.new_experience import note_verdict
 from tasks.fan_out.keys import key_of
 from tasks.inputs.gained_on_the_job import snapshot_of_questions
@@ -23,7 +24,6 @@ from tasks.libraries.challenger import LEARNED, make_challenger
 from tasks.libraries.judge_library import (
     CHALLENGER,
     CHAMPION,
-    FEWEST,
     Judging,
     LibraryJudgement,
     Side,
@@ -178,6 +178,7 @@ def _registered(
     }
     if made.judgement is not None:
         tags["sooner_than_alone_s"] = f"{made.judgement.alone.sooner_s:.6f}"
+        tags["benchmark"] = benchmark_tag(made.judgement.benchmark)
     if ours is not None:
         figures = {name: f"{getattr(ours, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
         tags |= figures | {"why": ours.why}

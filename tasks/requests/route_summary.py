@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from dashboards.cells import CellTable, decimal
-from planners.attempt import WITHOUT_MEMORY
+from planners.attempt import FROM_MEMORY, WITHOUT_MEMORY
 from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
@@ -132,7 +132,7 @@ def _rounded(figure: float) -> str:
 
 def legs_from_memory(route: Route) -> int:
     """How many legs of a ``route`` came from a memory, as stored or repaired."""
-    return sum(leg.source in ("recalled", "repaired") for leg in route.legs)
+    return sum(leg.source in FROM_MEMORY for leg in route.legs)
 
 
 def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:

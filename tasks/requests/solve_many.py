@@ -240,7 +240,7 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest) -> Sequence[
         return []
     from tasks.champions.drift_watch import report_drift, usefulness_at_work
 
-    return report_drift(memory, usefulness_at_work(request.out), request.learn)
+    return report_drift(memory, usefulness_at_work(memory, request.out), request.learn)
 
 
 def _repeated_id(parts: Sequence[FilePart]) -> str | None:

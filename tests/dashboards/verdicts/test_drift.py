@@ -5,9 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from dashboards.verdicts.drift import Usefulness, drifts, usefulness, usefulness_of
+from dashboards.verdicts.drift import (
+    FEWEST,
+    OTHERS,
+    Usefulness,
+    drifts,
+    library_at_work,
+    library_benchmark,
+    usefulness,
+    usefulness_of,
+)
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import attempts
 
@@ -101,3 +111,50 @@ def test_usefulness_counts_recalled_plans() -> None:
     assert found.mean_ms == pytest.approx(1e3 * rows["planning_seconds"].mean())
     assert found.solved == rows["solved"].sum()
     assert found.total_s == pytest.approx((rows["planning_seconds"] + rows["duration_s"]).mean())
+
+
+def _asked(name: str, count: int, from_memory: int, driving_s: float) -> pd.DataFrame:
+    """Attempts at ``count`` questions of a class, of which a library answers some."""
+    rng = np.random.default_rng(count)
+    rows: dict[str, object] = {
+        "problem_class": name, "planner": "lattice", "assist": "repair", "polished": True,
+        "source": ["repaired" if number < from_memory else "searched" for number in range(count)],
+        "planning_seconds": 0.1, "duration_s": driving_s + rng.normal(0.0, 1.0, count),
+    }  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+JUDGED = [_asked("dock", 80, 76, 10.0), _asked("yard", 80, 72, 18.0), _asked("lot", FEWEST - 1, 0, 8.0)]
+
+
+@pytest.mark.parametrize(
+    ("at_work", "told"),
+    [
+        ([_asked("dock", 40, 38, 10.0)], []),
+        ([_asked("dock", 40, 38, 10.0), _asked("yard", 60, 54, 18.0)], []),
+        ([_asked("yard", 60, 54, 18.0)], []),  # though all questions together were 14 s by mean
+        ([_asked("dock", 40, 20, 10.0), _asked("yard", 60, 54, 18.0)], ["lattice repair, dock"]),
+        ([_asked("dock", 40, 38, 10.0), _asked("yard", 60, 54, 22.0)], ["lattice repair, yard"]),
+        ([_asked("angled", 40, 8, 60.0)], [f"lattice repair, {OTHERS}"]),  # whatever they take
+        ([_asked("angled", 40, 35, 60.0)], []),
+        ([_asked("lot", 40, 0, 8.0)], [f"lattice repair, {OTHERS}"]),  # too few were judged to go by
+        ([_asked("dock", FEWEST - 1, 0, 10.0)], []),
+        ([_asked("dock", 40, 0, 10.0).assign(planner="gust")], []),
+        ([_asked("dock", 40, 0, 10.0).assign(polished=False)], []),
+    ],
+)
+def test_a_library_is_watched_by_class_and_in_questions_of_no_known_class(
+    at_work: list[pd.DataFrame], told: list[str]
+) -> None:
+    then = library_benchmark(pd.concat(JUDGED))
+    found = drifts("motion-memory-yards/2", library_at_work(pd.concat(at_work), then), then)
+    assert [each.configuration for each in found if each.has_drifted] == told
+
+
+def test_what_judged_a_library_is_no_drift() -> None:
+    judged = pd.concat(JUDGED)
+    then = library_benchmark(judged)
+    found = drifts("motion-memory-yards/2", library_at_work(judged, then), then)
+    assert {each.configuration for each in found} == set(then)
+    assert sum(each.now.problems for each in found) == len(judged)
+    assert not any(each.is_later for each in found)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from prefect.server.events.schemas.events import Resource, ResourceSpecification
 
 from dashboards.cells import NOTHING
 from dashboards.verdicts.drift import Drift, Usefulness, drifts
@@ -23,12 +24,18 @@ from storage.tables.watched import add_watched, read_watched
 from tasks.champions import drift_watch as task
 from tasks.champions.drift_watch import (
     DRIFT,
+    KIND,
+    LIBRARY,
+    RESOURCE,
+    RESOURCE_OF,
+    RUN,
     SOLVED,
     BenchmarkedMemory,
     benchmarked_memory,
     report_drift,
     usefulness_at_work,
 )
+from tasks.champions.retraining_schedule import RUNS
 from tasks.registry.champion_registry import Version
 from tests.dashboards.synthetic import attempts
 
@@ -45,7 +52,7 @@ class Sent:
     def __init__(self) -> None:
         self.events: list[str] = []
 
-    def __call__(self, url: str, found: Sequence[Drift]) -> None:
+    def __call__(self, url: str, found: Sequence[Drift], kind: str) -> None:
         self.events += [each for drift in found for each in (SOLVED, *([DRIFT] * drift.has_drifted))]
 
 
@@ -90,7 +97,9 @@ def test_problems_of_another_kind_in_the_same_file_change_nothing(
         rows = table.where(table.notna(), None).to_dict("records")
         blank = dict.fromkeys(ATTEMPTS.names)
         write_attempts(tmp_path / f"{name}.parquet", [blank | row for row in rows])
-        told.append(report_drift(BENCHMARKED, usefulness_at_work(tmp_path / f"{name}.parquet"), None))
+        told.append(
+            report_drift(BENCHMARKED, usefulness_at_work(BENCHMARKED, tmp_path / f"{name}.parquet"), None)
+        )
     assert told[0] == told[1]
     assert sent.events == [SOLVED, *([DRIFT] * (hits == 0))] * 2
 
@@ -163,3 +172,26 @@ def test_the_benchmark_of_a_registered_version_is_in_its_tags(
     assert benchmarked_memory("models:/motion-memory-trap/latest") is None
     assert benchmarked_memory(str(tmp_path / "memories" / "trap")) is None
     assert benchmarked_memory(None) is None
+
+
+@pytest.mark.parametrize(
+    ("drifting", "kinds"),
+    [
+        (RUNS, {"motion-memory-trap/1"}),
+        ({RESOURCE: f"{RESOURCE_OF}motion-memory-yards/*"}, {"motion-memory-yards/2"}),
+    ],
+)
+def test_a_retraining_is_started_by_drift_of_what_it_retrains(
+    drifting: dict[str, str], kinds: set[str]
+) -> None:
+    memories = {
+        "motion-memory-trap/1": RUN,
+        "motion-memory-yards/2": LIBRARY,
+        "motion-memory-yards-bus/1": LIBRARY,
+    }
+    wanted = ResourceSpecification({**drifting})
+    assert {
+        name
+        for name, kind in memories.items()
+        if wanted.matches(Resource({RESOURCE: f"{RESOURCE_OF}{name}", KIND: kind}))
+    } == kinds

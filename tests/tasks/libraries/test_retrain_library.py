@@ -24,6 +24,7 @@ from storage.archives.libraries import load_library
 from storage.places.data_folder import open_data_folder
 from storage.tables.attempts import read_attempts
 from storage.worlds.importing import ImportSettings
+from tasks.champions.drift_watch import LIBRARY, benchmarked_memory
 from tasks.champions.promote import roll_back
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.libraries import judge_library as judging
@@ -122,6 +123,10 @@ def test_a_library_grows_by_what_was_learned_and_is_judged_by_what_it_never_saw(
     added = new.questions[len(old.questions) :]
     assert added
     assert all(each.startswith("parallel") for each in added)
+    watched = benchmarked_memory(f"models:/{ASKED.registered}@champion")
+    assert watched is not None
+    assert (watched.kind, watched.name) == (LIBRARY, f"{ASKED.registered}/2")
+    assert [each.problems for each in watched.benchmark.values()] == [ASKED.test_problems]
     rows = read_attempts(data / "judged" / f"{second.folder.name}.parquet")
     assert set(rows["problem_id"]).isdisjoint(new.questions)
     assert set(rows["run_id"]) == {ALONE, CHAMPION, CHALLENGER}
