@@ -9,9 +9,9 @@ from tasks.settings.errors import RunError
 
 
 @contextmanager
-def may_lack_scipy(what: str) -> Iterator[None]:
-    """Where what needs SciPy is imported; without it, a RunError says what needs it and how to get it."""
+def may_lack(what: str, package: str = "'motion-memory[optimise]'") -> Iterator[None]:
+    """Where what needs a ``package`` is imported; without it, a RunError says so, and how to get it."""
     try:
         yield
     except ModuleNotFoundError as error:
-        raise RunError(f"{what} need {error.name}: pip install 'motion-memory[optimise]'.") from None
+        raise RunError(f"{what} need {error.name}: pip install {package}.") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from motion_memory.extras import may_lack_scipy
+from motion_memory.extras import may_lack
 from planners.maps.occupancy_map import OccupancyMap
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
@@ -53,7 +53,7 @@ def read_map(
         StorageError: The file is missing or unreadable, or the resolution is out of its range.
         RunError: SciPy is not installed.
     """
-    with may_lack_scipy("Maps"):
+    with may_lack("Maps"):
         from storage.worlds.importing import ImportSettings, load_map
         from tasks.requests.route_request import map_source
     check_path("path", path)
@@ -92,7 +92,7 @@ def read_worlds(
             be used.
         RunError: SciPy is not installed.
     """
-    with may_lack_scipy("Worlds"):
+    with may_lack("Worlds"):
         from storage.worlds.importing import ImportSettings, import_part
         from storage.worlds.sources import source_at
     check_path("path", path)
@@ -124,6 +124,7 @@ def solve_many(
     vehicle: str | None = None,
     seed: int = 1,
     plans: str | Path | None = None,
+    learn: str | Path | None = None,
     polished: bool = True,
     time_limit: float | None = None,
     improve_seconds: float = 0.0,
@@ -144,6 +145,7 @@ def solve_many(
             else that of the memory, else the car.
         seed: everything random follows from it.
         plans: a folder for the plans, one file each; by default none are written.
+        learn: a data folder that keeps the plans that no memory had; by default none are kept.
         polished: as of ``load``.
         time_limit: as of ``Memory.plan``.
         improve_seconds: as of ``Memory.plan``.
@@ -157,7 +159,7 @@ def solve_many(
     from tasks.requests.assistant import AssistantSettings
     from tasks.requests.solve_many import solve_many as solve_file
 
-    for name, value in (("problems", problems), ("out", out), ("plans", plans or "")):
+    for name, value in (("problems", problems), ("out", out), ("plans", plans or ""), ("learn", learn or "")):
         check_path(name, value)
     stored = None if memory is None else str(memory)
     settings = AssistantSettings(
@@ -171,4 +173,5 @@ def solve_many(
         time_limit=time_limit,
         improve_seconds=improve_seconds,
     )
-    solve_file(settings, Path(problems), Path(out), None if plans is None else Path(plans))
+    kept, learned = (None if folder is None else Path(folder) for folder in (plans, learn))
+    solve_file(settings, Path(problems), Path(out), kept, learned)

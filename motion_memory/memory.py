@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from motion_memory.array_problems import problem_of_arrays
-from motion_memory.extras import may_lack_scipy
+from motion_memory.extras import may_lack
 from motion_memory.plain import plain
 from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary
@@ -28,7 +29,7 @@ from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
-from tasks.settings.checks import check_times, is_whole
+from tasks.settings.checks import check_path, check_times, is_whole
 from tasks.settings.errors import UsageError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class Answer:
     call_seconds: (
         float  # of the whole call, reading and checking the problem included, but not judging the plan
     )
+    _asked: tuple[Problem, Attempt] | None = field(default=None, repr=False)  # canonical, for ``learn``
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,7 +166,7 @@ class Memory:
             ValueError: the map is none, or too wide, or the vehicle cannot drive backwards.
             RunError: SciPy is not installed.
         """
-        with may_lack_scipy("Routes"):
+        with may_lack("Routes"):
             from motion_memory.map_router import MapRouter
         assist = "fresh" if (self.stored, self.assist) == (None, "none") else self.assist
         workspace = Workspace()
@@ -230,6 +232,39 @@ class Memory:
         near = shifted(plan, (-read.offset[0], -read.offset[1]))
         return faults(read, scaled(near, 1.0 / read.scale), self.vehicle)
 
+    def learn(self, answers: Answer | Iterable[Answer], data: str | Path) -> int:
+        """Keep plans that no memory had, for later libraries and runs (docs/learning-on-the-job.md).
+
+        Each is judged once more; call this when the robot has time. Several processes may write to the same
+        folder, and what is learned again changes nothing.
+
+        Args:
+            answers: one or more of this memory's answers, to problems or to poses; those without a plan, or
+                with a plan of the memory, are left out.
+            data: the data folder, which is made if it is not there.
+
+        Returns:
+            how many of the plans no memory had.
+
+        Raises:
+            UsageError: what is given is no answer of ``plan`` or ``plan_arrays``.
+            PlanFaultError: the independent judge refuses a plan; nothing is kept then.
+            StorageError: the folder cannot be written.
+            RunError: pyarrow is not installed.
+        """
+        with may_lack("Learned plans", "pyarrow"):
+            from tasks.inputs.gained_on_the_job import Solved, remember
+        check_path("data", data)
+        solved = []
+        for answer in answers if isinstance(answers, Iterable) else [answers]:
+            if not isinstance(answer, Answer) or answer._asked is None:
+                raise UsageError(
+                    f"{short(answer)} is no answer of plan or plan_arrays: give what they return."
+                )
+            problem, attempt = answer._asked
+            solved.append(Solved(problem, check_attempt(problem, attempt, set(), self.vehicle)))
+        return remember(Path(data), solved, self.vehicle)
+
     def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
         """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
         if isinstance(given, Problem):
@@ -254,7 +289,7 @@ class Memory:
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
-        return Answer(problem.id, attempt.status, attempt.source, plan, *spent)
+        return Answer(problem.id, attempt.status, attempt.source, plan, *spent, (canonical, attempt))
 
     def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:
         return solve(

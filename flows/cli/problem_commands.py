@@ -84,7 +84,7 @@ def plan(
     from tasks.settings.errors import RunError
 
     assistant = Assistant(options.settings(assist, improve_seconds, problem, time_limit=time_limit))
-    attempt, found, answer, failure, written = plan_one(
+    attempt, found, answer, failure, written, learned = plan_one(
         assistant, problem, out, picture, explain, learn, pick
     )
     write_for_people(options.vehicle_line(assistant.settings, problem))
@@ -96,7 +96,7 @@ def plan(
         lines.append(f"{attempt.source}, {times}{gears_told(answer)}{sideways}")
     write_answer(*lines, **answer)
     write_files(plan=written, picture=picture)
-    _write_learned(learn)
+    _write_learned(learn, learned)
     if failure is not None:
         raise RunError(failure)
 
@@ -181,18 +181,20 @@ def solve(
     write_for_people(options.vehicle_line(settings, problems))
     _write_summary(solved)
     write_files(rows=out, plans=plans, picture=picture)
-    _write_learned(learn)
+    _write_learned(learn, solved.learned)
     write(*(f"watched  {line}" for line in solved.drift))
 
 
-def _write_learned(data: Path | None) -> None:
-    """Write where the plans for --learn lie, or why there are none."""
+def _write_learned(data: Path | None, count: int) -> None:
+    """Write how many plans --learn kept, and where they lie with those of before, or why there are none."""
     from tasks.inputs.gained_on_the_job import has_gained
 
-    if data is None or has_gained(data):
+    if data is None:
+        return
+    plans = f"{count:,} new plan{'' if count == 1 else 's'}"
+    write(f"kept     {plans}" if count else "kept     no new plan: none was searched anew")
+    if has_gained(data):
         write_files(learned=data)
-    else:
-        write("learned  nothing: no plan was searched anew")
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

@@ -35,6 +35,7 @@ class PlannedOne(NamedTuple):
     answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
     failure: str | None  # why there is no plan, in one line
     written: Path | None  # the file of the plan
+    learned: int  # 1 if the plan was kept as one that no memory had, else 0
 
 
 def plan_one(
@@ -74,8 +75,8 @@ def plan_one(
     written = write_answer_file(out, record)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
-    if learn is not None:
-        remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
+    solved = [Solved(to_canonical(problem)[0], attempt)]
+    learned = 0 if learn is None else remember(learn, solved, assistant.vehicle)
     recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
     drive = assistant.moved_drive(problem, attempt) if explained else None
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
@@ -97,7 +98,7 @@ def plan_one(
     if plan is None:
         why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
         failure = no_plan(problem.id or str(file), why, out, written)
-    return PlannedOne(attempt, plan, answer, failure, written)
+    return PlannedOne(attempt, plan, answer, failure, written, learned)
 
 
 def _explain(

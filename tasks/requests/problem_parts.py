@@ -93,6 +93,7 @@ class PartResult(NamedTuple):
     """Whether a part was solved."""
 
     faults: list[str]  # where malformed problems are, and what is wrong; if there are any, nothing is solved
+    learned: int = 0  # plans that no memory had
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:
@@ -143,10 +144,12 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
     rows = chunk.rows_begun()
     before = len(rows)
     solved: list[Solved] = []
+    learned = 0
 
     def keep(path: Path) -> None:
+        nonlocal learned
         if request.learn is not None:
-            remember(request.learn, solved, assistant.vehicle)
+            learned += remember(request.learn, solved, assistant.vehicle)
             solved.clear()
         write_attempts(path, rows, key=chunk.key)
 
@@ -180,7 +183,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 gc.collect()
     keep(chunk.shard)
     chunk.begun.unlink(missing_ok=True)
-    return PartResult([])
+    return PartResult([], learned)
 
 
 @contextmanager

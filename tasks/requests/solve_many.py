@@ -64,6 +64,7 @@ class SolvedMany(NamedTuple):
     solved_now: int  # problems that were attempted by this command; an earlier one attempted the others
     seconds: float  # that these took
     drift: Sequence[str]  # lines that compare the memory with its benchmark
+    learned: int  # plans that no memory had, of the problems attempted by this command
 
     @property
     def planning_seconds(self) -> tuple[float, float, float]:
@@ -136,7 +137,7 @@ def solve_many(
         if _is_finished(request, parts, key):
             _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
             _draw(parts, assistant, drawing)
-            return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [])
+            return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [], 0)
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             begun = sum(len(part.rows_begun()) for part in left)
@@ -160,7 +161,8 @@ def solve_many(
             remove_parts(out)
         _draw(parts, assistant, drawing)
     solved_now = sum(part.problem_slice.count for part in left) - begun
-    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request))
+    learned = sum(result.learned for result in results)
+    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request), learned)
 
 
 def _draw(parts: Sequence[FilePart], assistant: Assistant, drawing: Path | None) -> None:

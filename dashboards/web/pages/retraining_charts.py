@@ -75,7 +75,7 @@ def watched_charts(seen: pd.DataFrame) -> Iterator[Chart]:
     yield Chart(
         "drift",
         "Drift: do champions answer at work as in their benchmark?",
-        "A hit is a problem that a recalled plan answers as it is; of a library, any answer from memory. Each "
+        "A hit is a problem that a recalled plan answers as it is; of a library, all from memory. Each "
         "dot is one file of problems that was solved with the memory, vermilion if hits are significantly "
         "fewer than in its benchmark (Fisher's exact test) or planning and driving take significantly longer "
         f"(Welch's test), 0.1 % together. Times are in the table. {PLANNING_TIME}",
