@@ -31,7 +31,7 @@ from tasks.requests.map_routes import (
     in_frame_of,
     stops_over,
 )
-from tasks.settings.checks import is_number
+from tasks.settings.checks import check_time_limit, is_number
 from tasks.settings.errors import UsageError
 
 
@@ -42,7 +42,7 @@ class RouteAnswer:
     status: str  # "solved" or "stuck"
     source: str | None  # "searched" if any local plan was, else "repaired" or "recalled"; None when stuck
     plan: Plan | None  # in the map's frame and metres; None when stuck
-    why: str | None  # one clause: why and where it is stuck; None when solved
+    why: str | None  # one clause: why and where it is stuck, or that the time is up; None when solved
     local_plans: int  # how many were looked for
     planning_seconds: float  # of the whole search, in which the judge looks at each local plan
 
@@ -93,6 +93,7 @@ class MapRouter:
         goal_radius: float | None = None,
         goal_tolerance: tuple[float, float] | None = None,
         goal_hitches: Sequence[float] = (),
+        time_limit: float | None = None,
     ) -> RouteAnswer:
         """Find a drive from a pose through all goals, at each of which it stops; or say where it is stuck.
 
@@ -104,6 +105,8 @@ class MapRouter:
             goal_tolerance: metres and radians by which poses may be missed; None: 0.1, times the scale, and
                 0.05.
             goal_hitches: hitch angles in poses, rad, one for each trailer; none: as they come.
+            time_limit: seconds, after which the search ends as stuck, and a polish with what it has; what is
+                found by then depends on the machine. None: no limit.
 
         Raises:
             ValueError: an argument is no such numbers, no goal takes it, or the vehicle cannot move or stand
@@ -129,9 +132,10 @@ class MapRouter:
         check_options(stops, for_poses, {"goal_radius": goal_radius is not None}, "a goal")
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
+        check_time_limit(time_limit, "time_limit")
         self._solver.seconds.clear()
         began = perf_counter()
-        route = self._router.route((x / scale, y / scale, heading), stops, motion)
+        route = self._router.route((x / scale, y / scale, heading), stops, motion, time_limit)
         seconds = perf_counter() - began
         if isinstance(route, Stuck):
             why = route.told(self._world, scale)

@@ -177,6 +177,7 @@ def route(
     start_hitch: Annotated[list[float] | None, Parameter(allow_leading_hyphen=True, negative=())] = None,
     format: str | None = None,
     assist: AssistName | None = None,
+    time_limit: float | None = None,
     out: Path | None = None,
     picture: Path | None = None,
     options: SolveOptions = _USUAL,
@@ -202,6 +203,8 @@ def route(
         format: moving-ai, ros or numpy; by default recognised by the file's ending.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, fresh
             without.
+        time_limit: Seconds of planning, after which the search ends without a route. What is found by then
+            depends on the machine.
         out: Where to write the plan, .json.
         picture: Where to draw the route, .png, .svg or .pdf.
         options: How to solve local problems.
@@ -220,7 +223,7 @@ def route(
         "start_turn_rate": start_turn_rate,
         "start_hitch": start_hitch,
     }
-    request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius)
+    request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius, time_limit)
     driven = drive_route(path, format, request, assistant, settings, out, picture)
     write_for_people(options.vehicle_line(assistant.settings))
     if driven.legs is not None:

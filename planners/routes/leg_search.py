@@ -26,6 +26,7 @@ from planners.search.outcome import MEANINGS, Status
 from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Problem
 from planners.world.vehicles.dynamics import simulate
@@ -39,6 +40,7 @@ RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and 
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
 POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
 BRIEFLY: Final = Limits(expansions=8_000)
+LATE: Final = "the limit of time ended the search where it was nearest to the goal"
 
 Solve = Callable[[Problem, Limits], Attempt]
 
@@ -62,10 +64,20 @@ class LegSearch:
         self._solve, self._vehicle, self._name = solve, vehicle, name
         self.begin()
 
-    def begin(self) -> None:
-        """Begin another route: its local problems are counted, and named, from 0."""
+    def begin(self, until: float = math.inf) -> None:
+        """Begin another route: its local problems are counted, and named, from 0.
+
+        Args:
+            until: when the search ends, by ``working_clock``.
+        """
+        self._until = until
         self.attempts = self._most_attempts = self._pose_tries = 0
         self._is_enclosed = False
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the time is up."""
+        return working_clock() >= self._until
 
     def legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""
@@ -94,6 +106,9 @@ class LegSearch:
     def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats) -> Stuck:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
         place = float(nearest[0]), float(nearest[1])
+        to_go = float(ahead.to_go(nearest[np.newaxis])[0])
+        if self.is_late:
+            return Stuck(place, LATE, self.attempts, to_go, is_late=True)
         if self._is_enclosed:
             why = MEANINGS[Status.GOAL_ENCLOSED]
             return Stuck(ahead.stop.place, why, self.attempts, is_enclosed=True)
@@ -101,7 +116,7 @@ class LegSearch:
             why = "the vehicle can neither stop in time nor drive on from its motion at the start"
             return Stuck(place, why, self.attempts)
         why = "no plan leads on from where the search came nearest to the goal"
-        return Stuck(place, why, self.attempts, float(ahead.to_go(nearest[np.newaxis])[0]))
+        return Stuck(place, why, self.attempts, to_go)
 
     def _rests(self, state: Floats) -> bool:
         """Whether the vehicle stands, however its wheels are steered; of the first order it stops at once."""
@@ -111,7 +126,7 @@ class LegSearch:
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
-            if self.attempts == self._most_attempts or self._is_enclosed:
+            if self.attempts == self._most_attempts or self._is_enclosed or self.is_late:
                 break
             if goal.final and ahead.stop.is_pose and not goal.brief:
                 if self._pose_tries == POSE_TRIES:
@@ -119,7 +134,9 @@ class LegSearch:
                 self._pose_tries += 1
             problem = self._problem(state, goal)
             self.attempts += 1
-            attempt = self._solve(problem, BRIEFLY if goal.brief else usual_limits(problem))
+            limits = BRIEFLY if goal.brief else usual_limits(problem)
+            left = max(self._until - working_clock(), 0.0)
+            attempt = self._solve(problem, replace(limits, seconds=min(limits.seconds, left)))
             if attempt.plan is None:
                 self._is_enclosed = goal.final and attempt.status == Status.GOAL_ENCLOSED
                 continue

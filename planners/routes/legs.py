@@ -55,7 +55,12 @@ def joined(problem: Problem, legs: Sequence[Leg], vehicle: Vehicle) -> Plan:
 
 
 def polished_legs(
-    problem: Problem, legs: list[Leg], vehicle: Vehicle, scene: Scene, workspace: Workspace
+    problem: Problem,
+    legs: list[Leg],
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    seconds: float = math.inf,
 ) -> list[Leg]:
     """Polish the drive of some legs as a whole: where they meet it need not be as either planned it.
 
@@ -65,6 +70,7 @@ def polished_legs(
         vehicle: what is driven.
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
+        seconds: that it may take.
 
     Returns:
         Parts of a drive that costs less, one for each leg, that stops no farther from a place than before; or
@@ -72,10 +78,10 @@ def polished_legs(
     """
     plan = joined(problem, legs, vehicle)
     steps = len(plan.controls)
-    if not 0 < steps <= MOST_STEPS:
+    if not 0 < steps <= MOST_STEPS or seconds <= 0.0:
         return legs
     around = _only_near(stricter(problem, plan.states[-1]), plan)
-    better = polish(around, plan, vehicle, scene_of(around), workspace).plan
+    better = polish(around, plan, vehicle, scene_of(around), workspace, seconds=seconds).plan
     if better is None or cost_of(better, vehicle) >= cost_of(plan, vehicle):
         return legs
     states = simulate(plan.states[0], better.controls, vehicle)

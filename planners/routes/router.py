@@ -15,7 +15,7 @@ from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.maps.widest_way import Gap, middle_of, narrowest_gap
-from planners.routes.leg_search import LegSearch, Solve
+from planners.routes.leg_search import LATE, LegSearch, Solve
 from planners.routes.legs import Leg, polished_legs
 from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
@@ -23,6 +23,7 @@ from planners.routes.stuck import NARROW, Stuck
 from planners.search.braking import is_free_drive
 from planners.search.free_goal import lacks_room, unfolded
 from planners.world.arrays import Floats, Point, Pose
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import note_free, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_START,
@@ -82,14 +83,23 @@ class Router:
         self._wider.append(cache(self._roomy_paths))
         self._search = LegSearch(self._surroundings, self._scene, solve, vehicle, world.name)
 
-    def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
+    def route(
+        self,
+        start: Pose,
+        stops: Sequence[Stop],
+        motion: tuple[float, ...] = (),
+        time_limit: float | None = None,
+    ) -> Route | Stuck:
         """Find a route from a pose (m, m, rad) through all ``stops``.
 
         Args:
             start: where the drive begins.
             stops: where the vehicle is to come to rest, in this order.
             motion: the state at the start behind the pose, speed (m/s) first; what is missing is 0.
+            time_limit: seconds, after which the search ends, and the polish with what it has; what is found
+                by then depends on the machine. None: no limit.
         """
+        until = math.inf if time_limit is None else working_clock() + time_limit
         begun = replace(self._whole, start=start, start_motion=motion)
         problems = [
             replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
@@ -106,7 +116,7 @@ class Router:
                 return Stuck(stop.place, f"{who} has no room in the goal pose", 0)
         sections: list[list[Leg]] = []
         paths = []
-        self._search.begin()
+        self._search.begin(until)
         for number, stop in enumerate(stops):
             ahead = PathAhead(self._paths, stop, self._scene, state)
             path = ahead.path(state)
@@ -125,9 +135,11 @@ class Router:
                 more = more._replace(
                     why=more.why.replace("the goal", goal), attempts=max(self._search.attempts, 1)
                 )
-                return more if more.to_go is None else self._at_a_gap(more, more.place, stop.place)
+                at_once = more.is_late or more.to_go is None
+                return more if at_once else self._at_a_gap(more, more.place, stop.place)
             if self._polishes:
-                more = polished_legs(problems[number], more, self._vehicle, self._scene, self._workspace)
+                driven = self._vehicle, self._scene, self._workspace
+                more = polished_legs(problems[number], more, *driven, until - working_clock())
             sections.append(more)
             paths.append(np.vstack((pose[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
@@ -142,12 +154,15 @@ class Router:
         self, stuck: Stuck, ahead: PathAhead, path: Floats, state: Floats
     ) -> list[Leg] | Stuck:
         """Search the legs to a stop where a search along the shortest ``path [n, 2]`` got ``stuck``."""
-        if stuck.is_enclosed:
+        if stuck.is_enclosed or stuck.is_late:
             return stuck
         legs = None
         if stuck.to_go is not None:
             legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), DOORS)
-        return legs or self._legs_around(path, ahead.stop, state) or stuck
+        legs = legs or self._legs_around(path, ahead.stop, state)
+        if self._search.is_late and (legs is None or isinstance(legs, Stuck)):
+            return stuck._replace(why=LATE, is_late=True)
+        return legs or stuck
 
     def _legs_through(
         self, ahead: PathAhead, state: Floats, place: Point, doors: int

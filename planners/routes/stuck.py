@@ -21,6 +21,7 @@ class Stuck(NamedTuple):
     gap: Gap | None = None  # the narrowest on the widest way from there, if the vehicle hardly fits through
     width: float = 0.0  # metres, of the widest body
     is_enclosed: bool = False  # whether no drive leads far out of the goal pose: then no other way helps
+    is_late: bool = False  # whether the limit of time ended the search
 
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
@@ -42,6 +43,7 @@ class Stuck(NamedTuple):
         return {
             "why": self.why,
             "goal_is_enclosed": self.is_enclosed,
+            "time_is_up": self.is_late,
             "place": _in_map(self.place, world, scale),
             "to_go_m": None if self.to_go is None else scale * self.to_go,
             "gap": gap,

@@ -33,7 +33,7 @@ from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
 from tasks.requests.route_summary import legs_from_memory, route_summary, route_table
 from tasks.requests.waiting import told_meanwhile
-from tasks.settings.checks import check_outputs, check_picture, check_plan_file
+from tasks.settings.checks import check_outputs, check_picture, check_plan_file, check_time_limit
 from tasks.settings.errors import RunError, UsageError
 
 
@@ -73,6 +73,7 @@ def drive_route(
     """
     check_plan_file(out)
     check_picture(drawing)
+    check_time_limit(request.time_limit, "--time-limit")
     pose = start_of(request)
     check_drives_backwards(assistant.vehicle)
     source = map_source(path, map_format, "a route")
@@ -92,7 +93,7 @@ def drive_route(
 
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
-    asked = (x / scale, y / scale, heading), stops, motion
+    asked = (x / scale, y / scale, heading), stops, motion, request.time_limit
     with told_meanwhile("planning"):
         _drive_mirrored(router_over, canonical, *asked)
         OtherWork()()
@@ -134,6 +135,7 @@ def _drive_mirrored(
     start: Pose,
     stops: Sequence[Stop],
     motion: tuple[float, ...],
+    time_limit: float | None,
 ) -> None:
     """Find the route of the mirrored map: the code is ready then, but no problem of the route is known."""
     width = world.size[0]
@@ -151,7 +153,7 @@ def _drive_mirrored(
         for stop in stops
     ]
     turned = motion[:1] + tuple(-each for each in motion[1:])
-    across.route((width - x, y, math.pi - heading), asked, turned)
+    across.route((width - x, y, math.pi - heading), asked, turned, time_limit)
 
 
 def _refusal(
@@ -163,6 +165,8 @@ def _refusal(
         return UsageError(f"{line}." if stuck.is_too_narrow else f"{line}; choose another place or heading.")
     if stuck.is_enclosed:
         advice = "make room around it, or choose another place or heading"
+    elif stuck.is_late:
+        advice = "give it more time with --time-limit"
     elif stuck.is_too_narrow:
         advice = "it does not fit through"
     else:

@@ -33,6 +33,7 @@ class RouteRequest(NamedTuple):
     motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
     goal_hitch: Sequence[float] = ()  # how each trailer stands in poses; none: as they come
     goal_radius: float | None = None  # metres by which places may be missed; None: the usual
+    time_limit: float | None = None  # seconds, after which the search ends; None: no limit
 
 
 def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:

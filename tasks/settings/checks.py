@@ -89,10 +89,15 @@ def check_times(time_limit: float | None, improve_seconds: float, names: tuple[s
         UsageError: one of them is wrong.
     """
     limit, improvement = names
-    if time_limit is not None and not (is_number(time_limit) and time_limit > 0.0):
-        raise UsageError(f"{limit} is {time_limit!r}: give a number of seconds above 0.")
+    check_time_limit(time_limit, limit)
     if not (is_number(improve_seconds) and improve_seconds >= 0.0):
         raise UsageError(f"{improvement} is {improve_seconds!r}: give a number of seconds, 0 or more.")
+
+
+def check_time_limit(seconds: float | None, name: str) -> None:
+    """Raise UsageError unless a time limit is None or above 0 ``seconds``; the caller calls it ``name``."""
+    if seconds is not None and not (is_number(seconds) and seconds > 0.0):
+        raise UsageError(f"{name} is {seconds!r}: give a number of seconds above 0.")
 
 
 def is_number(value: object) -> bool:

@@ -108,6 +108,8 @@ def test_where_it_is_stuck_is_told(world: motion_memory.OccupancyMap, router: An
         ({"goal_tolerance": (0.1, 0.1)}, "^goal_tolerance is for poses"),
         ({"goals": [(60.0, 80.0, 0.0)], "goal_radius": 1.0}, "^goal_radius is for places"),
         ({"start_motion": (1e3,)}, "speed"),
+        ({"time_limit": 0.0}, "^time_limit is 0.0"),
+        ({"time_limit": "1"}, "^time_limit"),
         ({"start_motion": "fast"}, "start_motion"),
         ({"start_motion": "12"}, "start_motion"),
         ({"start_motion": (0.5, 0.0, 0.0)}, "^The start has"),
@@ -173,3 +175,19 @@ def test_without_scipy_it_is_said_what_to_install(
     monkeypatch.setitem(sys.modules, "storage.worlds.importing", None)  # as an import without SciPy ends
     with pytest.raises(motion_memory.RunError, match="pip install"):
         read(file)
+
+
+def test_a_route_that_takes_too_long_is_given_up(
+    file: Path, world: motion_memory.OccupancyMap, router: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begin, there = world.pose(*POSE), world.pose(60.0, 80.0, 0.0)[:2]
+    late = router.route(begin, [there], time_limit=1e-6)
+    assert (late.status, late.plan) == ("stuck", None)
+    assert "limit of time" in late.why
+    usual = router.route(begin, [there])
+    assert np.array_equal(router.route(begin, [there], time_limit=600.0).plan.states, usual.plan.states)
+    asked = ["route", str(file), "--from", ",".join(map(str, begin)), "--to", ",".join(map(str, there))]
+    assert call([*asked, "--time-limit", "1e-6", "--json"]) == 1
+    told = capsys.readouterr()
+    assert json.loads(told.out)["answer"]["time_is_up"] is True
+    assert told.err.count("--time-limit") == 1
