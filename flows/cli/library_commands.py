@@ -74,16 +74,16 @@ def retrain_library(
         options: How the library is gathered and judged, and where.
         reading: How maps are read.
     """
+    from tasks.libraries.pending_library import check_there_is_something, library_dry_run
     from tasks.servers.prefect_server import local_server
     from tasks.session.folder_lock import locked_folder
     from tasks.settings.environment import default_data
 
     data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
     if dry_run:
-        from tasks.libraries.pending_library import library_dry_run
-
         write(library_dry_run(data, asked))
         return 0
+    check_there_is_something(data, asked)
     given = _parameters(asked, options, reading)
     with locked_folder(data) as folder, local_server(folder.path) as server:
         from flows.retrain_library import retrain_library as flow  # late: Prefect reads its environment

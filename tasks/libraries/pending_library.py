@@ -133,10 +133,7 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
     champion = registry.aliased(asked.registered)
     if champion is None:
         if not asked.sources and not learned:
-            raise UsageError(
-                f"{asked.name} has no sources, and nothing was learned: name a class, a family of "
-                "manoeuvres, a map, worlds or a file of problems, or solve problems with --learn."
-            )
+            raise _nothing_to_gather(asked.name)
         line = f"{asked.name}: no champion yet; {_counted(len(learned), 'learned question')}"
         return PendingLibrary(None, number, True, True, line)
     if champion.tag("vehicle") not in ("", label_of(vehicle)):
@@ -155,6 +152,13 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
     return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
 
 
+def check_there_is_something(data: Path, asked: LibraryRetraining) -> None:
+    """Raise UsageError if there are no sources, and no data folder that may hold what was learned."""
+    path = local_place(data).expanduser().absolute()
+    if not asked.sources and not fetch(path / MARK).is_file():
+        raise _nothing_to_gather(asked.name)
+
+
 def library_dry_run(data: Path, asked: LibraryRetraining) -> str:
     """Say in a line what retraining a library would find to do now, and write nothing.
 
@@ -166,12 +170,20 @@ def library_dry_run(data: Path, asked: LibraryRetraining) -> str:
         RunError: the registry cannot be reached.
         UsageError: there is nothing to gather from.
     """
+    check_there_is_something(data, asked)
     path = local_place(data).expanduser().absolute()
     if not fetch(path / MARK).is_file():
         return f"{data} is not a data folder yet: the first library {asked.name} would be gathered in it."
     folder = DataFolder(path)
     pending = pending_library(folder, asked, Registry(folder))
     return f"{pending.line}: {'a library would be gathered' if pending.is_due else 'nothing would be done'}"
+
+
+def _nothing_to_gather(name: str) -> UsageError:
+    return UsageError(
+        f"{name} has no sources, and nothing was learned: name a class, a family of manoeuvres, a map, "
+        "worlds or a file of problems, or solve problems with --learn."
+    )
 
 
 def _counted(count: int, what: str) -> str:

@@ -211,6 +211,15 @@ def test_what_cannot_be_retrained_is_told_in_a_line_before_anything_is_written(
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.parametrize("options", [[], ["--dry-run"]])
+def test_without_sources_no_data_folder_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str]
+) -> None:
+    assert call(["retrain-library", "lots", *options, "--data", str(tmp_path / "data")]) == 2
+    assert "nothing was learned" in capsys.readouterr().err
+    assert not (tmp_path / "data").exists()
+
+
 def test_two_questions_of_a_champion_decide_nothing(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _timed(monkeypatch, more_is_better=True)
     few = ASKED._replace(test_problems=1)
