@@ -107,11 +107,11 @@ class LegSearch:
         """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
         place = float(nearest[0]), float(nearest[1])
         to_go = float(ahead.to_go(nearest[np.newaxis])[0])
-        if self.is_late:
-            return Stuck(place, LATE, self.attempts, to_go, is_late=True)
         if self._is_enclosed:
             why = MEANINGS[Status.GOAL_ENCLOSED]
             return Stuck(ahead.stop.place, why, self.attempts, is_enclosed=True)
+        if self.is_late:
+            return Stuck(place, LATE, self.attempts, to_go, is_late=True)
         if free_stop(start, self._vehicle, self._scene) is None:
             why = "the vehicle can neither stop in time nor drive on from its motion at the start"
             return Stuck(place, why, self.attempts)

@@ -135,8 +135,9 @@ class Router:
                 more = more._replace(
                     why=more.why.replace("the goal", goal), attempts=max(self._search.attempts, 1)
                 )
-                at_once = more.is_late or more.to_go is None
-                return more if at_once else self._at_a_gap(more, more.place, stop.place)
+                if more.is_late or more.to_go is None:
+                    return more
+                return self._at_a_gap(more, more.place, stop.place)
             if self._polishes:
                 driven = self._vehicle, self._scene, self._workspace
                 more = polished_legs(problems[number], more, *driven, until - working_clock())
@@ -160,7 +161,7 @@ class Router:
         if stuck.to_go is not None:
             legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), DOORS)
         legs = legs or self._legs_around(path, ahead.stop, state)
-        if self._search.is_late and (legs is None or isinstance(legs, Stuck)):
+        if legs is None and self._search.is_late:
             return stuck._replace(why=LATE, is_late=True)
         return legs or stuck
 

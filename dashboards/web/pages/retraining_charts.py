@@ -75,10 +75,10 @@ def watched_charts(seen: pd.DataFrame) -> Iterator[Chart]:
     yield Chart(
         "drift",
         "Drift: do champions answer at work as in their benchmark?",
-        "A hit is a problem that a recalled plan answers as it is; of a library, all from memory. Each "
-        "dot is one file of problems that was solved with the memory, vermilion if hits are significantly "
-        "fewer than in its benchmark (Fisher's exact test) or planning and driving take significantly longer "
-        f"(Welch's test), 0.1 % together. Times are in the table. {PLANNING_TIME}",
+        "A hit is a problem that a recalled plan answers as it is; of a library, any that is answered from "
+        "memory. Each dot is one file of problems that was solved with the memory, vermilion if hits are "
+        "significantly fewer than in its benchmark (Fisher's exact test) or planning and driving take "
+        f"significantly longer (Welch's test), 0.1 % together. Times are in the table. {PLANNING_TIME}",
         drawings,
         seen,
         [(BLUE, "at work"), (VERMILLION, "drifted"), (GREEN, "in its benchmark")],
@@ -133,8 +133,9 @@ def _watched(title: str, seen: pd.DataFrame) -> Drawing:
     hits, promised = (
         100.0 * (seen[f"{of}hits"] / seen[f"{of}problems"]).to_numpy(float) for of in ("", "benchmark_")
     )
+    ends = 0.8, len(seen) + 0.2  # so that a line is seen of one file, too
     drawn = [
-        Line("in its benchmark", number, promised, GREEN),
+        Line("in its benchmark", np.array([ends[0], *number, ends[1]]), np.pad(promised, 1, "edge"), GREEN),
         Line("at work", number, hits, BLUE, dots=True),
     ]
     drifted = [_verdict(row) != AS_IT_WAS for row in seen.to_dict("records")]
@@ -142,5 +143,5 @@ def _watched(title: str, seen: pd.DataFrame) -> Drawing:
         drawn.append(Line("drifted", number[i : i + 1], hits[i : i + 1], VERMILLION, dots=True))
     return lines(
         title, drawn, "file of problems, the oldest first", "hits, %", y_ends=(0.0, 100.0),
-        x_ends=(0.8, len(seen) + 0.2), x_ticks=number[:: max(1, len(number) // 8)].tolist(),
+        x_ends=ends, x_ticks=number[:: max(1, len(number) // 8)].tolist(),
     )  # fmt: skip
