@@ -7,7 +7,7 @@ from pathlib import Path
 from prefect import flow
 
 from flows.gather import gather
-from tasks.champions.retraining_schedule import log_failure
+from tasks.champions.retraining_schedule import log_failure, log_if_scheduled
 from tasks.libraries.pending_library import library_retraining
 from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.libraries.retrain_library import retrain_library as task
@@ -42,4 +42,7 @@ def retrain_library(
         vehicle, seed, scale=scale, resolution=resolution, unknown=unknown, tolerance=tolerance
     )
     asked = library_retraining(name, sources, plans, poses, difficulty, settings, test_problems, approve)
-    return task(Path(data), asked, workers, gather)
+    made = task(Path(data), asked, workers, gather)
+    if made is not None:
+        log_if_scheduled(made.summary, made.beside)
+    return made

@@ -23,7 +23,7 @@ from planners.world.alignment import from_canonical, scaled, shifted, to_canonic
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, name_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
@@ -49,7 +49,8 @@ class Answer:
     call_seconds: (
         float  # of the whole call, reading and checking the problem included, but not judging the plan
     )
-    _asked: tuple[Problem, Attempt] | None = field(default=None, repr=False)  # canonical, for ``learn``
+    # what ``learn`` keeps of a plan that no memory had: the problem, canonical, the attempt and who drives
+    _found: tuple[Problem, Attempt, Vehicle] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,30 +240,35 @@ class Memory:
         folder, and what is learned again changes nothing.
 
         Args:
-            answers: one or more of this memory's answers, to problems or to poses; those without a plan, or
-                with a plan of the memory, are left out.
+            answers: one or more answers of ``plan`` or ``plan_arrays``; those without a plan, or with a plan
+                of the memory, are left out.
             data: the data folder, which is made if it is not there.
 
         Returns:
-            how many of the plans no memory had.
+            how many of the plans no memory had, whether or not they were learned before.
 
         Raises:
-            UsageError: what is given is no answer of ``plan`` or ``plan_arrays``.
+            UsageError: what is given is no such answer, or another vehicle drives it.
             PlanFaultError: the independent judge refuses a plan; nothing is kept then.
             StorageError: the folder cannot be written.
             RunError: pyarrow is not installed.
         """
         with may_lack("Learned plans", "pyarrow"):
-            from tasks.inputs.gained_on_the_job import Solved, remember
+            from tasks.inputs.gained_on_the_job import NEW, Solved, remember
         check_path("data", data)
         solved = []
         for answer in answers if isinstance(answers, Iterable) else [answers]:
-            if not isinstance(answer, Answer) or answer._asked is None:
+            if not isinstance(answer, Answer) or (answer.source in NEW and answer._found is None):
                 raise UsageError(
                     f"{short(answer)} is no answer of plan or plan_arrays: give what they return."
                 )
-            problem, attempt = answer._asked
-            solved.append(Solved(problem, check_attempt(problem, attempt, set(), self.vehicle)))
+            if answer._found is None:
+                continue
+            problem, attempt, vehicle = answer._found
+            if vehicle != self.vehicle:
+                names = [name_of(each) for each in (vehicle, self.vehicle)]
+                raise UsageError(f"{names[0]} drives the answer to {problem.id}, and not {names[1]}.")
+            solved.append(Solved(problem, check_attempt(problem, attempt, set(), vehicle)))
         return remember(Path(data), solved, self.vehicle)
 
     def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
@@ -289,7 +295,8 @@ class Memory:
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
-        return Answer(problem.id, attempt.status, attempt.source, plan, *spent, (canonical, attempt))
+        found = None if attempt.source in (None, "recalled") else (canonical, attempt, self.vehicle)
+        return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found)
 
     def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:
         return solve(

@@ -3,7 +3,7 @@
 A hit is a problem that a recalled plan answers as it is, whatever a search finds beside it; the total time is
 that of planning and driving, of the problems that were solved. A memory has drifted if its hits have fallen
 so far (Fisher's exact test, one-sided), or its total times have risen so far (Welch's test, one-sided), as
-they would in at most one case of a thousand if all were as in the benchmark: rare enough for a retraining
+they would in at most one file of a thousand if all were as in the benchmark: rare enough for a retraining
 that nobody asked for. Polished answers are compared with polished ones of the benchmark. Where it has none
 (of planners that do not answer by default), total times at work are shorter, and only later ones than that
 count.
@@ -27,9 +27,9 @@ from planners.attempt import FROM_MEMORY
 from planners.world.arrays import Floats
 from storage.tables.configurations import POLISHED, configured
 
-SIGNIFICANCE: Final = 0.001  # of both tests together
+SIGNIFICANCE: Final = 0.001  # of all tests of a file together
 FEWEST: Final = 20  # problems; fewer never count as a fall
-OTHERS: Final = "other questions"  # of a library: those of classes of which too few are known
+OTHERS: Final = "other questions"  # than those of the classes that a library was judged in
 LIBRARY_WAY: Final = ("lattice", "repair")  # planner and assist with which libraries are judged
 
 
@@ -38,7 +38,7 @@ class Usefulness:
     """How useful a memory was to one planner in one configuration."""
 
     problems: int
-    hits: int  # problems that a recalled plan answered
+    hits: int  # problems that a recalled plan answered as it is; of a library, all answers from memory
     mean_ms: float
     median_ms: float
     solved: int = 0  # problems that the total times are of; benchmarks of earlier versions know none
@@ -62,16 +62,22 @@ class Drift:
     p_value: float  # of so few hits by chance
     later_p_value: float  # of so long total times by chance
     then_as_found: bool = False  # whether polished answers are compared with plans as they were found
+    comparisons: int = 1  # of the same file, among which this is one
+
+    @property
+    def _significance(self) -> float:
+        """Of one test of hits or times, so that all of a file together keep to ``SIGNIFICANCE``."""
+        return SIGNIFICANCE / (2 * self.comparisons)
 
     @property
     def has_fallen(self) -> bool:
         """Whether hits are significantly fewer than in the benchmark."""
-        return self.now.problems >= FEWEST and self.p_value < SIGNIFICANCE / 2
+        return self.now.problems >= FEWEST and self.p_value < self._significance
 
     @property
     def is_later(self) -> bool:
         """Whether planning and driving take significantly longer than in the benchmark."""
-        return self.now.solved >= FEWEST and self.later_p_value < SIGNIFICANCE / 2
+        return self.now.solved >= FEWEST and self.later_p_value < self._significance
 
     @property
     def has_drifted(self) -> bool:
@@ -125,44 +131,48 @@ def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
 def library_benchmark(judged: pd.DataFrame) -> dict[str, Usefulness]:
     """How useful a library was in the ``judged`` attempts: in each class, and in all of them as ``OTHERS``.
 
-    A class with fewer than ``FEWEST`` questions is only part of the latter.
+    Where there are fewer than ``FEWEST`` questions, total times say too little and are left out.
     """
-    of_all = {_way(OTHERS): _hits_alone(_usefulness(_answers(judged)))} if len(judged) else {}
-    return of_all | _by_class(judged, judged["problem_class"].unique())
+    by_class = {
+        name: figures if figures.problems >= FEWEST else _hits_alone(figures)
+        for name, figures in _by_class(judged).items()
+    }
+    return by_class | _in_others(judged)
 
 
 def library_at_work(attempts: pd.DataFrame, benchmark: Collection[str]) -> dict[str, Usefulness]:
     """How useful a library was in ``attempts``: in each class of its ``benchmark``, and in ``OTHERS``.
 
-    A class with fewer than ``FEWEST`` questions is part of the latter. Of these total times are left out, as
-    other questions take other times. Attempts in other ways than libraries are judged in do not count.
+    Others are those of classes that it was not judged in; their total times are left out, as other questions
+    take other times. Attempts in other ways than libraries are judged in do not count.
     """
     planner, assist = LIBRARY_WAY
-    alike = attempts[
-        (attempts["planner"] == planner) & (attempts["assist"] == assist) & attempts["polished"].astype(bool)
-    ]
-    known = [name for name in alike["problem_class"].unique() if _way(name) in benchmark]
-    by_class = _by_class(alike, known)
-    others = alike[[_way(name) not in by_class for name in alike["problem_class"]]]
-    of_others = {_way(OTHERS): _hits_alone(_usefulness(_answers(others)))} if len(others) else {}
-    return by_class | of_others
+    same_way = (attempts["planner"] == planner) & (attempts["assist"] == assist)
+    alike = attempts[same_way & attempts["polished"].eq(True)]
+    known = np.array([_class(str(name)) in benchmark for name in alike["problem_class"]], bool)
+    return _by_class(alike[known]) | _in_others(alike[~known])
 
 
-def _by_class(attempts: pd.DataFrame, known: Collection[str]) -> dict[str, Usefulness]:
-    rows = _answers(attempts[attempts["problem_class"].isin(known)])
+def _by_class(attempts: pd.DataFrame) -> dict[str, Usefulness]:
     return {
-        _way(str(name)): _usefulness(of_class)
-        for name, of_class in rows.groupby("problem_class", observed=True)
-        if len(of_class) >= FEWEST
+        _class(str(name)): _usefulness(_answers(of_class))
+        for name, of_class in attempts.groupby("problem_class", observed=True)
     }
 
 
-def _way(questions: str) -> str:
-    """What events and pages call how a library answers some questions."""
-    return f"{' '.join(LIBRARY_WAY)}, {questions}"
+def _in_others(attempts: pd.DataFrame) -> dict[str, Usefulness]:
+    """Under a name that no class can have."""
+    way = " ".join(LIBRARY_WAY)
+    return {f"{way} ({OTHERS})": _hits_alone(_usefulness(_answers(attempts)))} if len(attempts) else {}
+
+
+def _class(name: str) -> str:
+    """What events and pages call how a library answers the questions of a class."""
+    return f"{' '.join(LIBRARY_WAY)}, {name}"
 
 
 def _answers(attempts: pd.DataFrame) -> pd.DataFrame:
+    """With all answers from memory as hits."""
     return attempts.assign(hit=attempts["source"].isin(FROM_MEMORY))
 
 
@@ -207,7 +217,7 @@ def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Useful
         if before is not None:
             p_values = _fewer(mine, before), _later(mine, before)
             found.append(Drift(memory, name, mine, before, *p_values, then_as_found=name not in then))
-    return found
+    return [replace(each, comparisons=len(found)) for each in found]
 
 
 def _fewer(now: Usefulness, then: Usefulness) -> float:

@@ -124,9 +124,11 @@ def serve_library(
     """
     from tasks.champions.drift_watch import RESOURCE, RESOURCE_OF
     from tasks.champions.retraining_schedule import serve
+    from tasks.libraries.pending_library import check_there_is_something
     from tasks.settings.environment import default_data
 
     data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
+    check_there_is_something(data, asked)
     given = _parameters(asked, options, reading)
     drifting = {RESOURCE: f"{RESOURCE_OF}{asked.registered}/*"}
     serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, drifting)

@@ -185,14 +185,18 @@ def solve(
     write(*(f"watched  {line}" for line in solved.drift))
 
 
-def _write_learned(data: Path | None, count: int) -> None:
-    """Write how many plans --learn kept, and where they lie with those of before, or why there are none."""
+def _write_learned(data: Path | None, count: int | None) -> None:
+    """Write how many plans --learn found to keep, and where they lie with those of before.
+
+    None stands for a count that an earlier command has told.
+    """
     from tasks.inputs.gained_on_the_job import has_gained
 
     if data is None:
         return
-    plans = f"{count:,} new plan{'' if count == 1 else 's'}"
-    write(f"kept     {plans}" if count else "kept     no new plan: none was searched anew")
+    if count is not None:
+        plans = f"{count or 'no'} plan{'' if count == 1 else 's'}"
+        write(f"found    {plans} that no memory had")
     if has_gained(data):
         write_files(learned=data)
 

@@ -70,14 +70,14 @@ class LegSearch:
         Args:
             until: when the search ends, by ``working_clock``.
         """
-        self._until = until
+        self._until, self.is_late = until, False
         self.attempts = self._most_attempts = self._pose_tries = 0
         self._is_enclosed = False
 
-    @property
-    def is_late(self) -> bool:
-        """Whether the time is up."""
-        return working_clock() >= self._until
+    def time_is_up(self) -> bool:
+        """Whether the search has to end now; it is late from then on."""
+        self.is_late = self.is_late or working_clock() >= self._until
+        return self.is_late
 
     def legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""
@@ -126,7 +126,7 @@ class LegSearch:
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
-            if self.attempts == self._most_attempts or self._is_enclosed or self.is_late:
+            if self.attempts == self._most_attempts or self._is_enclosed or self.time_is_up():
                 break
             if goal.final and ahead.stop.is_pose and not goal.brief:
                 if self._pose_tries == POSE_TRIES:

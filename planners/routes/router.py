@@ -158,10 +158,10 @@ class Router:
         if stuck.is_enclosed or stuck.is_late:
             return stuck
         legs = None
-        if stuck.to_go is not None:
+        if stuck.to_go is not None and not self._search.time_is_up():
             legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), DOORS)
         legs = legs or self._legs_around(path, ahead.stop, state)
-        if legs is None and self._search.is_late:
+        if legs is None and stuck.to_go is not None and self._search.is_late:
             return stuck._replace(why=LATE, is_late=True)
         return legs or stuck
 
@@ -194,6 +194,8 @@ class Router:
         straight = (0.0,) * len(trailers_of(self._vehicle))
         tolerances = (POSE_TOLERANCE,) * len(straight)
         for heading in (through, through + math.pi):
+            if self._search.time_is_up():
+                break
             place = x - off * math.cos(heading), y - off * math.sin(heading)
             if not point_is_free(*place, self._scene):
                 continue
@@ -219,6 +221,8 @@ class Router:
         """
         metres = length_of(path)
         for wider in self._wider:
+            if self._search.time_is_up():
+                break
             around = PathAhead(wider(), stop, self._scene, state)
             other = around.path(state)
             if other is None:

@@ -47,7 +47,7 @@ def add_gained(
     folder: Path,
     experiences: Sequence[Experience],
     *,
-    planner: str,
+    planners: Sequence[str],
     seeds: Sequence[int],
     planning_seconds: Sequence[float],
     vehicle: Vehicle,
@@ -57,7 +57,7 @@ def add_gained(
     Args:
         folder: folder of experiences that were gained.
         experiences: ``[n]``, all of the vehicle.
-        planner: name of the planner that found them.
+        planners: ``[n]``, names of those that found them.
         seeds: ``[n]``, the seed of each search.
         planning_seconds: ``[n]``, what each search took.
         vehicle: the vehicle that drives them.
@@ -69,7 +69,7 @@ def add_gained(
     write_experiences(
         folder / f"{_digest(marks)}.parquet",
         experiences,
-        planners=[planner] * len(experiences),
+        planners=planners,
         seeds=seeds,
         planning_seconds=planning_seconds,
         vehicle=vehicle,

@@ -44,7 +44,7 @@ class BenchmarkedMemory(NamedTuple):
     """A memory, and how useful it was in its benchmark."""
 
     name: str  # as events name it: ``name/version``, or ``run/memory``
-    benchmark: Mapping[str, Usefulness]  # by planner and configuration
+    benchmark: Mapping[str, Usefulness]  # by planner and configuration, or class of questions
     data_folder: Path  # the folder that the memory belongs to
     kind: str = RUN  # of memory: a run's, or a library
 
@@ -81,7 +81,7 @@ def _registered(name: str, alias: str | None, number: str | None) -> Benchmarked
         return None
     figures = json.loads(version.tag("benchmark"))
     benchmark = {configuration: Usefulness(**values) for configuration, values in figures.items()}
-    kind = LIBRARY if version.tag("recipe") else RUN
+    kind = LIBRARY if version.is_library else RUN
     return BenchmarkedMemory(f"{name}/{version.number}", benchmark, data_folder, kind)
 
 
@@ -126,15 +126,20 @@ def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data:
         a line for each comparison.
     """
     comparisons = drifts(memory.name, now, memory.benchmark)
+    if memory.kind == LIBRARY and not comparisons:
+        return [f"{memory.name}: not compared, as libraries are judged with the lattice, repair, polished"]
     lines = [str(drift) for drift in comparisons]
     lines += _store(memory.data_folder, comparisons)
     any_drifted = any(drift.has_drifted for drift in comparisons)
     server = _server([data, default_data()]) if comparisons else None
     if server is None:
-        return lines + ["no Prefect server received the event: `motion-memory serve` runs one"] * any_drifted
+        serve = "serve-library" if memory.kind == LIBRARY else "serve"
+        return (
+            lines + [f"no Prefect server received the event: `motion-memory {serve}` runs one"] * any_drifted
+        )
     url = server["PREFECT_API_URL"]
     try:
-        _send(server, comparisons, memory.kind)
+        _send(server, events_of(comparisons), memory.kind)
     except Exception as error:  # whatever fails in Prefect, the problems are solved
         reason = (str(error) or type(error).__name__).splitlines()[0]
         return [*lines, f"Prefect at {url} did not receive the events: {reason}"]
@@ -165,7 +170,14 @@ def _server(folders: Sequence[Path | None]) -> dict[str, str] | None:
     return None
 
 
-def _send(server: Mapping[str, str], comparisons: Sequence[Drift], kind: str) -> None:
+def events_of(comparisons: Sequence[Drift]) -> list[tuple[str, Drift]]:
+    """The events of a file: ``SOLVED`` for each comparison, ``DRIFT`` once, as one retraining is enough."""
+    drifted = [drift for drift in comparisons if drift.has_drifted]
+    clearest = sorted(drifted, key=lambda drift: min(drift.p_value, drift.later_p_value))[:1]
+    return [*((SOLVED, drift) for drift in comparisons), *((DRIFT, drift) for drift in clearest)]
+
+
+def _send(server: Mapping[str, str], events: Sequence[tuple[str, Drift]], kind: str) -> None:
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.actions import ArtifactCreate
     from prefect.events import Event, Resource
@@ -186,15 +198,13 @@ def _send(server: Mapping[str, str], comparisons: Sequence[Drift], kind: str) ->
 
     async def send_events() -> None:
         async with PrefectEventsClient(reconnection_attempts=1) as client:
-            for drift in comparisons:
-                await client.emit(event(SOLVED, drift))
-                if drift.has_drifted:
-                    await client.emit(event(DRIFT, drift))
+            for name, drift in events:
+                await client.emit(event(name, drift))
 
     with temporary_settings(server):
         asyncio.run(send_events())
-        markdown = "".join(f"- {drift}\n" for drift in comparisons)
-        key = artifact_key(f"watch-{comparisons[0].memory}")
+        markdown = "".join(f"- {drift}\n" for name, drift in events if name == SOLVED)
+        key = artifact_key(f"watch-{events[0][1].memory}")
         artifact = ArtifactCreate(key=key, type="markdown", description="Hits and times", data=markdown)
         with get_client(sync_client=True) as client:  # an artifact outside of a flow: Prefect's own way warns
             client.create_artifact(artifact)

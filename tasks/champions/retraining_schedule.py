@@ -88,6 +88,15 @@ def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
         _LOG.error("motion-memory: %s", reason.partition("exception: ")[2] or reason)
 
 
+def log_if_scheduled(*lines: str) -> None:
+    """Log what came of a retraining, if the schedule started it; a command says so itself."""
+    from prefect.runtime import deployment
+
+    if deployment.id is not None:
+        for line in filter(None, lines):
+            _LOG.info(line)
+
+
 def retraining_parameters(
     settings: RunSettings, approve: bool, workers: int, scheduler: str | None = None
 ) -> dict[str, Any]:

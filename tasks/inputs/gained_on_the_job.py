@@ -24,6 +24,7 @@ from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.run_settings import RunSettings
 
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
+NAMELESS: Final = ("", "problem")  # ids of problems that were given none
 DIGITS: Final = 12  # of a question's digest, in its id
 
 
@@ -43,23 +44,24 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
 
     Args:
         data: the data folder.
-        attempts: checked attempts of one planner.
+        attempts: checked attempts.
         vehicle: who drives.
 
     Returns:
-        how many plans were added.
+        how many plans no memory had; of one that is there already nothing more is kept.
     """
     straight: list[tuple[Experience, Attempt]] = []
     questions: list[tuple[Experience, Attempt]] = []
     for problem, attempt in attempts:
         if attempt.plan is None or attempt.source not in NEW:
             continue
+        # its own id may come again: straight ones are left out of tests by theirs, unless they have none
+        named = replace(problem, id=f"{problem.class_name}-{question_digest(problem)[:DIGITS]}")
         if is_canonical(problem) and begins_straight(problem):
-            straight.append((Experience(problem, attempt.plan, vehicle), attempt))
+            kept = named if problem.id in NAMELESS else problem
+            straight.append((Experience(kept, attempt.plan, vehicle), attempt))
         elif attempt.source == "searched":
-            name = f"{problem.class_name}-{question_digest(problem)[:DIGITS]}"  # its own may come again
-            question = replace(problem, id=name)
-            questions.append((Experience(question, attempt.plan, vehicle), attempt))
+            questions.append((Experience(named, attempt.plan, vehicle), attempt))
     label = label_of(vehicle)
     folder = open_data_folder(data)
     for place, new in ((folder.gained(label), straight), (folder.gained_questions(label), questions)):
@@ -67,7 +69,7 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
             add_gained(
                 place,
                 [experience for experience, _ in new],
-                planner=new[0][1].planner,
+                planners=[attempt.planner for _, attempt in new],
                 seeds=[attempt.seed for _, attempt in new],
                 planning_seconds=[attempt.planning_seconds for _, attempt in new],
                 vehicle=vehicle,

@@ -35,7 +35,7 @@ class PlannedOne(NamedTuple):
     answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
     failure: str | None  # why there is no plan, in one line
     written: Path | None  # the file of the plan
-    learned: int  # 1 if the plan was kept as one that no memory had, else 0
+    learned: int  # 1 if the plan is kept as one that no memory had, else 0
 
 
 def plan_one(

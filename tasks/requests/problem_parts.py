@@ -93,7 +93,7 @@ class PartResult(NamedTuple):
     """Whether a part was solved."""
 
     faults: list[str]  # where malformed problems are, and what is wrong; if there are any, nothing is solved
-    learned: int = 0  # plans that no memory had
+    learned: int = 0  # plans that no memory had, if they are kept
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:

@@ -64,7 +64,7 @@ class SolvedMany(NamedTuple):
     solved_now: int  # problems that were attempted by this command; an earlier one attempted the others
     seconds: float  # that these took
     drift: Sequence[str]  # lines that compare the memory with its benchmark
-    learned: int  # plans that no memory had, of the problems attempted by this command
+    learned: int | None  # plans that no memory had, of the problems attempted by this command, if any were
 
     @property
     def planning_seconds(self) -> tuple[float, float, float]:
@@ -123,8 +123,6 @@ def solve_many(
     assistant = Assistant(settings)  # raises UsageError early
     plan_of_one = None if plans is None else plans / f"{problems.stem}.json"  # named by the id
     check_outputs([problems, *assistant.files], [out, plans, plan_of_one, drawing])
-    if learn is not None:
-        open_data_folder(learn)
     as_usual = not settings.improve_seconds and settings.time_limit is None
     compared = settings.memory is not None and as_usual
     benchmarked = _benchmarked_memory(settings.memory) if compared else None
@@ -132,12 +130,14 @@ def solve_many(
     with memory_folder(settings.memory) as memory:
         settings = settings._replace(memory=None if memory is None else str(memory))
         request = SolveRequest(problems, out, settings, memory_digest(memory), plans, learn)
-        parts = parts_of(request)
+        parts = parts_of(request)  # raises StorageError if there is nothing to solve
+        if learn is not None:
+            open_data_folder(learn)
         key = key_of("solve", [part.key for part in parts])
         if _is_finished(request, parts, key):
             _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
             _draw(parts, assistant, drawing)
-            return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [], 0)
+            return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [], None)
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             begun = sum(len(part.rows_begun()) for part in left)

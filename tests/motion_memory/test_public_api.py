@@ -308,14 +308,14 @@ def test_what_a_memory_had_is_not_learned(memory: motion_memory.Memory, tmp_path
 def test_a_plan_that_is_wrong_is_not_learned(tmp_path: Path) -> None:
     alone = motion_memory.load(None, warm=False, judged=False)
     answer = alone.plan(fields_of(QUESTIONS[0]))
-    assert answer._asked is not None
-    asked, attempt = answer._asked
+    assert answer._found is not None
+    asked, attempt, vehicle = answer._found
     assert attempt.plan is not None
     off = attempt.plan.states.copy()
     off[3:, 0] += 0.1
     wrong = replace(attempt, plan=Plan(off, attempt.plan.controls, attempt.plan.dt))
     with pytest.raises(motion_memory.PlanFaultError):
-        alone.learn([answer, replace(answer, _asked=(asked, wrong))], tmp_path / "data")
+        alone.learn([answer, replace(answer, _found=(asked, wrong, vehicle))], tmp_path / "data")
     assert not (tmp_path / "data").exists()
 
 
@@ -336,3 +336,33 @@ def test_a_robot_without_pyarrow_is_told_what_learning_needs(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(motion_memory.RunError, match="pip install pyarrow"):
         memory.learn([], tmp_path / "data")
+
+
+def test_straight_problems_without_a_name_are_all_learned(tmp_path: Path) -> None:
+    alone = motion_memory.load(None, warm=False)
+    asked = [{name: value for name, value in fields_of(problem(k)).items() if name != "id"} for k in range(3)]
+    answers = [alone.plan(each) for each in asked]
+    assert alone.learn(answers, tmp_path) == 3
+    kept = read_gained(DataFolder(tmp_path).gained("car"), CAR)
+    plans = {answer.plan.states.tobytes() for answer in answers if answer.plan is not None}
+    assert len(kept) == len(plans) > 1
+
+
+def test_answers_of_another_vehicle_are_not_learned(tmp_path: Path) -> None:
+    answer = motion_memory.load(None, warm=False).plan(fields_of(QUESTIONS[0]))
+    other = motion_memory.load(None, vehicle="differential-drive", warm=False)
+    with pytest.raises(motion_memory.UsageError, match="car drives"):
+        other.learn(answer, tmp_path / "data")
+
+
+def test_who_found_a_plan_is_kept_with_it(tmp_path: Path) -> None:
+    planners = ["lattice", "gust"]
+    answers = [
+        motion_memory.load(None, planner=name, warm=False).plan({**fields_of(problem(k)), "id": name})
+        for k, name in enumerate(planners)
+    ]
+    motion_memory.load(None, warm=False).learn(answers, tmp_path)
+    kept = read_gained(DataFolder(tmp_path).gained("car"), CAR)
+    assert sorted((each.experience.problem.id, each.planner) for each in kept) == [
+        (name, name) for name in sorted(planners)
+    ]

@@ -24,6 +24,7 @@ from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.search.braking import braking, is_free_drive
+from planners.search.outcome import Status
 from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.authority.authority import faults
@@ -426,3 +427,40 @@ def test_whenever_the_time_is_up_there_is_the_usual_route_or_none(monkeypatch: p
         else:
             assert np.array_equal(check(found).plan(CAR).states, usual.states)
     assert 3 < late < 8
+
+
+OPEN = OccupancyMap("open", np.zeros((60, 60), bool), 1.0)
+POSE = Stop((40.0, 30.0), POSE_RADIUS, Arrival(0.5, POSE_TOLERANCE, 0.0, 0.0))
+
+
+def _in_vain(monkeypatch: pytest.MonkeyPatch, status: Status) -> Router:
+    """A router whose local problems have no plan, each of which takes 100 s."""
+    clock = _Ticks()
+    for each in (leg_search, router):
+        monkeypatch.setattr(each, "working_clock", clock)
+
+    def solve_in_vain(problem: Problem, limits: Limits) -> Attempt:
+        clock.now += 100.0
+        return replace(searched(problem, replace(limits, expansions=1)), plan=None, status=status)
+
+    return Router(OPEN, solve_in_vain)
+
+
+def test_an_enclosed_goal_is_told_though_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = _in_vain(monkeypatch, Status.GOAL_ENCLOSED).route((10.0, 30.0, 0.0), [POSE], time_limit=350.0)
+    assert isinstance(found, Stuck)
+    assert (found.is_enclosed, found.is_late) == (True, False)
+
+
+@pytest.mark.parametrize("time_limit", [None, 150.0])
+def test_no_other_way_is_looked_for_once_the_time_is_up(
+    monkeypatch: pytest.MonkeyPatch, time_limit: float | None
+) -> None:
+    over = _in_vain(monkeypatch, Status.BUDGET_SPENT)
+    looked: list[int] = []
+    usual = over._wider
+    over._wider = [lambda way=way: looked.append(1) or way() for way in usual]  # type: ignore[misc, func-returns-value]
+    found = over.route((10.0, 30.0, 0.0), [POSE], time_limit=time_limit)
+    assert isinstance(found, Stuck)
+    assert found.is_late == (time_limit is not None)
+    assert bool(looked) == (time_limit is None)

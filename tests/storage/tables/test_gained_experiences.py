@@ -45,7 +45,12 @@ def add(folder: Path, experiences: list[Experience]) -> None:
     """Add them, all with the same planner, seed and time."""
     count = len(experiences)
     add_gained(
-        folder, experiences, planner="gust", seeds=[1] * count, planning_seconds=[0.5] * count, vehicle=CAR
+        folder,
+        experiences,
+        planners=["gust"] * count,
+        seeds=[1] * count,
+        planning_seconds=[0.5] * count,
+        vehicle=CAR,
     )
 
 
