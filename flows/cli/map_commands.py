@@ -66,7 +66,7 @@ def gather(
     /,
     *,
     out: Path,
-    plans: int = 1000,
+    plans: int | None = None,
     poses: float = 0.25,
     difficulty: Difficulty = "standard",
     vehicle: str | None = None,
@@ -84,7 +84,8 @@ def gather(
             and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
             problems: these are the questions. Data folders: what solve and plan have learned there.
         out: Folder of the library, a new one.
-        plans: How many questions to have answered; where fewer can be, the library holds those.
+        plans: How many questions to have answered; where fewer can be, the library holds those. Default:
+            1000, or fewer if all sources are files of problems and data folders that hold no more.
         poses: Share of the drawn questions that ask for a pose, not for a place.
         difficulty: Difficulty of classes and families.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
@@ -104,6 +105,7 @@ def gather(
     counts = task.gather(
         sources, out, plans, poses, difficulty, settings, worker_count(workers), gather_pieces
     )
+    wanted = task.wanted_plans(plans, sources, counts)
     write(task.gathered_table(counts))
     write_files(library=out)
     if model is not None:
@@ -111,7 +113,7 @@ def gather(
 
         asked = {
             "sources": " ".join(sources),
-            "plans": plans,
+            "plans": wanted,
             "poses": poses,
             "difficulty": difficulty,
             "seed": seed,
@@ -119,7 +121,7 @@ def gather(
         write_files(
             model=register_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
         )
-    return SHORT if sum(each.answered for each in counts) < plans else 0
+    return SHORT if sum(each.answered for each in counts) < wanted else 0
 
 
 def gather_pieces(request: GatherRequest) -> list[Gathered]:

@@ -40,13 +40,14 @@ from tasks.requests.part_folder import (
     remove_parts,
     unfinished,
 )
-from tasks.requests.question_sources import Share, is_data_folder, is_drawn
+from tasks.requests.question_sources import Share, holds_its_own, is_data_folder, is_drawn
 from tasks.settings.checks import check_count, check_known, check_outputs
 from tasks.settings.errors import RunError, UsageError
 
 GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
 _LOG = logging.getLogger(__name__)
+USUAL: Final = 1000  # questions to have answered, if no number is given
 FEW_PLANS: Final = 50  # gathering so many here takes hardly more time than starting a server and workers
 HEADINGS: Final = ("source", "questions asked", "questions answered", "plans stored", "mean driving s")
 UNFIT: Final = re.compile(r"[^\w\-. /]")  # in names of MLflow's metrics
@@ -73,7 +74,7 @@ class Answered(NamedTuple):
 def gather(
     sources: Sequence[str],
     out: Path,
-    plans: int,
+    plans: int | None,
     poses: float,
     difficulty: str,
     settings: ImportSettings,
@@ -96,7 +97,7 @@ def gather(
         sources: names of classes and families; paths of maps, of worlds, of files of problems, or of data
             folders, for what the vehicle has learned there.
         out: the folder to write, which must not be there.
-        plans: how many questions to have answered.
+        plans: how many questions to have answered; None: ``USUAL``, or fewer if the sources hold no more.
         poses: the share of drawn questions that ask for a pose; the others ask for a place.
         difficulty: of classes and families: easy, standard or hard.
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
@@ -113,13 +114,14 @@ def gather(
         StorageError: a source cannot be read.
         RunError: no question could be answered.
     """
-    check_asked_questions(plans, poses, difficulty, sources)
+    wanted = USUAL if plans is None else plans
+    check_asked_questions(wanted, poses, difficulty, sources)
     paths = [Path(each) for each in sources if not is_drawn(each) and not is_data_folder(each)]
     check_outputs(paths, [out])
     for name in sources:
         if is_drawn(name) and Path(name).exists():
             _LOG.warning("%s is taken for the class or family; write ./%s for the folder here.", name, name)
-    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings, share)
+    request = GatherRequest(tuple(sources), out, wanted, poses, difficulty, settings, share)
     asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
     if gathered is not None and gathered["asked"] == asked:
         load_library(out, settings.vehicle)  # StorageError if it is damaged
@@ -134,8 +136,18 @@ def gather(
             save_library(out, library, {"asked": asked, "sources": [each._asdict() for each in counts]})
         for path in snapshots.values():
             remove(path)
-    warn_if_short(counts, plans)
+    warn_if_short(counts, wanted_plans(plans, sources, counts))
     return counts
+
+
+def wanted_plans(plans: int | None, sources: Sequence[str], counts: Sequence[SourceCounts]) -> int:
+    """How many questions were to be answered, by what ``gather`` was asked for and what came of each source.
+
+    Where no number was given, and all sources hold what they hold, all of that was, up to ``USUAL``.
+    """
+    if plans is None and all(map(holds_its_own, sources)):
+        return min(USUAL, sum(each.questions for each in counts))
+    return USUAL if plans is None else plans
 
 
 def _snapshots(request: GatherRequest) -> dict[str, Path]:

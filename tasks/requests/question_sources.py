@@ -61,6 +61,11 @@ def is_data_folder(name: str) -> bool:
     return not is_drawn(name) and (is_remote(name) or (Path(name) / MARK).is_file())
 
 
+def holds_its_own(name: str) -> bool:
+    """Whether a source is a file of problems or a data folder, whose questions are as many as they are."""
+    return is_data_folder(name) or (not is_drawn(name) and Path(name).suffix in FORMATS)
+
+
 def turn_of(sources: Sequence[QuestionSource], number: int) -> tuple[QuestionSource, int]:
     """Whose turn it is at question ``number``, and the question's number there."""
     return sources[number % len(sources)], number // len(sources)

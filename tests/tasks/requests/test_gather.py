@@ -356,3 +356,19 @@ def test_sources_of_one_name_are_counted_together_in_a_form_that_mlflow_takes() 
         gather.SourceCounts(name, 5, 4, plans, 9.0) for name, plans in (("a(1).map", 3), ("a(1).map", 4))
     ]
     assert gather.gathered_metrics(counts)["plans_a_1_.map"] == 7.0
+
+
+@pytest.mark.parametrize(
+    ("plans", "sources", "wanted"),
+    [
+        (None, ["asked.jsonl"], 10),
+        (7, ["asked.jsonl"], 7),
+        (None, ["asked.jsonl", "lot"], 1_000),
+        (None, ["town.map"], 1_000),
+    ],
+)
+def test_all_that_files_hold_is_enough_if_no_number_is_given(
+    plans: int | None, sources: list[str], wanted: int
+) -> None:
+    counts = [gather.SourceCounts("asked", 10, 9, 16, 9.0)]
+    assert gather.wanted_plans(plans, sources, counts) == wanted
