@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.extras import may_lack
 from motion_memory.plain import plain
-from planners.attempt import Attempt
+from planners.attempt import NEW, Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
@@ -254,7 +254,7 @@ class Memory:
             RunError: pyarrow is not installed.
         """
         with may_lack("Learned plans", "pyarrow"):
-            from tasks.inputs.gained_on_the_job import NEW, Solved, remember
+            from tasks.inputs.gained_on_the_job import Solved, remember
         check_path("data", data)
         solved = []
         for answer in answers if isinstance(answers, Iterable) else [answers]:
@@ -295,7 +295,7 @@ class Memory:
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
-        found = None if attempt.source in (None, "recalled") else (canonical, attempt, self.vehicle)
+        found = (canonical, attempt, self.vehicle) if attempt.source in NEW else None
         return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found)
 
     def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:

@@ -12,6 +12,7 @@ WITHOUT_MEMORY = ("none", "fresh")  # the assists whose top k is 0
 SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a library or from a memory ...
 DRIVES = "drives"  # ... if a whole plan was moved to the problem
 FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers that a memory gave
+NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
 
 
 @dataclass(frozen=True, eq=False)

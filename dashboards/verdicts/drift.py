@@ -30,7 +30,7 @@ from storage.tables.configurations import POLISHED, configured
 SIGNIFICANCE: Final = 0.001  # of all tests of a file together
 FEWEST: Final = 20  # problems; fewer never count as a fall
 OTHERS: Final = "other questions"  # than those of the classes that a library was judged in
-LIBRARY_WAY: Final = ("lattice", "repair")  # planner and assist with which libraries are judged
+JUDGED_WITH: Final = ("lattice", "repair")  # planner and assist that answer where libraries are judged
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def library_at_work(attempts: pd.DataFrame, benchmark: Collection[str]) -> dict[
     Others are those of classes that it was not judged in; their total times are left out, as other questions
     take other times. Attempts in other ways than libraries are judged in do not count.
     """
-    planner, assist = LIBRARY_WAY
+    planner, assist = JUDGED_WITH
     same_way = (attempts["planner"] == planner) & (attempts["assist"] == assist)
     alike = attempts[same_way & attempts["polished"].eq(True)]
     known = np.array([_class(str(name)) in benchmark for name in alike["problem_class"]], bool)
@@ -162,13 +162,13 @@ def _by_class(attempts: pd.DataFrame) -> dict[str, Usefulness]:
 
 def _in_others(attempts: pd.DataFrame) -> dict[str, Usefulness]:
     """Under a name that no class can have."""
-    way = " ".join(LIBRARY_WAY)
-    return {f"{way} ({OTHERS})": _hits_alone(_usefulness(_answers(attempts)))} if len(attempts) else {}
+    name = f"{' '.join(JUDGED_WITH)} ({OTHERS})"
+    return {name: _hits_alone(_usefulness(_answers(attempts)))} if len(attempts) else {}
 
 
 def _class(name: str) -> str:
     """What events and pages call how a library answers the questions of a class."""
-    return f"{' '.join(LIBRARY_WAY)}, {name}"
+    return f"{' '.join(JUDGED_WITH)}, {name}"
 
 
 def _answers(attempts: pd.DataFrame) -> pd.DataFrame:

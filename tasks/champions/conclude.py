@@ -83,7 +83,7 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
 
 
 def benchmark_tag(benchmark: Mapping[str, Usefulness]) -> str:
-    """The tag of a version that says how useful it was, by configuration, for who watches it at work."""
+    """The text of a version's tag ``benchmark``: how useful it was, for comparing it with its use at work."""
     return json.dumps({name: asdict(figures) for name, figures in benchmark.items()})
 
 

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.attempt import Attempt
+from planners.attempt import NEW, Attempt
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Arrival, Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
@@ -23,7 +23,6 @@ from storage.tables.gained_experiences import add_gained, gained_shards, snapsho
 from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.run_settings import RunSettings
 
-NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
 NAMELESS: Final = ("", "problem")  # ids of problems that were given none
 DIGITS: Final = 12  # of a question's digest, in its id
 

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import pandas as pd
 
 from dashboards.cells import NOTHING, CellTable, decimal, percent
-from dashboards.verdicts.drift import FEWEST, LIBRARY_WAY, OTHERS, Usefulness, library_benchmark
+from dashboards.verdicts.drift import FEWEST, JUDGED_WITH, OTHERS, Usefulness, library_benchmark
 from dashboards.verdicts.promotion import Judgement, judge
 from planners.attempt import FROM_MEMORY, Attempt
 from planners.memory.library.plan_library import PlanLibrary
@@ -36,7 +36,7 @@ from tasks.requests.gather_pieces import GIVE_UP, GatherRequest, read_sources
 from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unfinished
 from tasks.requests.question_sources import turn_of
 
-PLANNER, ASSIST = LIBRARY_WAY
+PLANNER, ASSIST = JUDGED_WITH
 TOP_K: Final = 5
 PIECE: Final = 20  # questions
 NOTICED_S: Final = 0.05  # more plans cost milliseconds to look through, where manoeuvres take seconds
@@ -85,7 +85,7 @@ class LibraryJudgement(NamedTuple):
     alone: Judgement
     champion: Judgement | None  # None if there is no champion
     sides: list[SideFigures]  # what each of them did
-    benchmark: dict[str, Usefulness]  # how useful the library is, for who watches it at work
+    benchmark: dict[str, Usefulness]  # how useful the library was here, by class of questions
 
 
 def judge_library(judging: Judging) -> LibraryJudgement:

@@ -75,8 +75,9 @@ def plan_one(
     written = write_answer_file(out, record)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
-    solved = [Solved(to_canonical(problem)[0], attempt)]
-    learned = 0 if learn is None else remember(learn, solved, assistant.vehicle)
+    learned = 0
+    if learn is not None:
+        learned = remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
     drive = assistant.moved_drive(problem, attempt) if explained else None
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"

@@ -175,14 +175,14 @@ def test_the_benchmark_of_a_registered_version_is_in_its_tags(
 
 
 @pytest.mark.parametrize(
-    ("drifting", "kinds"),
+    ("drifting", "told"),
     [
         (RUNS, {"motion-memory-trap/1"}),
         ({RESOURCE: f"{RESOURCE_OF}motion-memory-yards/*"}, {"motion-memory-yards/2"}),
     ],
 )
 def test_a_retraining_is_started_by_drift_of_what_it_retrains(
-    drifting: dict[str, str], kinds: set[str]
+    drifting: dict[str, str], told: set[str]
 ) -> None:
     memories = {
         "motion-memory-trap/1": RUN,
@@ -194,4 +194,4 @@ def test_a_retraining_is_started_by_drift_of_what_it_retrains(
         name
         for name, kind in memories.items()
         if wanted.matches(Resource({RESOURCE: f"{RESOURCE_OF}{name}", KIND: kind}))
-    } == kinds
+    } == told
