@@ -262,6 +262,16 @@ class _Linked(CPUDispatcher):
         super().__init__(py_func, locals, options, _LinkedCompiler)
         self._cache = _LinkedCache(py_func)
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Take all whole numbers as one kind: what is compiled for a known one, as 0, serves any other."""
+        widened = {name: _widened(kind) for name, kind in kws.items()}
+        return super().get_call_template([_widened(kind) for kind in args], widened)
+
+
+def _widened(kind: Any) -> Any:
+    kind = types.unliteral(kind)
+    return types.int64 if kind in types.signed_domain else kind
+
 
 class _Kernel(CPUDispatcher):
     """A kernel as Python calls it."""

@@ -6,6 +6,7 @@ ways seem to lead in, and nearly all of them end at an obstacle.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
@@ -41,12 +42,14 @@ KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried 
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
 TURN: Final = 64  # expansions of both trees together before each has another turn
+NO_BEND: Final = math.nan
 
 
 class Outward(NamedTuple):
     """How a tree grows. Lengths are in those of the first body."""
 
-    bends: tuple[float, ...] = (1.0, 0.0, -1.0)  # shares of the tightest
+    # Shares of the tightest bend; as many for all vehicles, which then run the same compiled code.
+    bends: tuple[float, float, float, float, float] = (1.0, NO_BEND, 0.0, NO_BEND, -1.0)
     stride: float = 1.0  # share of ``stride_of`` from one look to the next
     marks: tuple[float, ...] = (3.0, 8.0, 15.0, 30.0, 50.0, 80.0)  # times ``STRIDE``: where arcs may end
     cell: float = 0.05  # side of a cell
@@ -176,6 +179,8 @@ def open_node(
         if stride_m <= 0.0:
             continue
         for share in settings.bends:
+            if math.isnan(share):
+                continue
             bend = share * bend_limit
             if node > 0 and bend == tree.bends[node] and (gear * tree.metres[node] < 0.0 or not further):
                 continue  # back where it came from, or on where its parent has been

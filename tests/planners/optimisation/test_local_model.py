@@ -19,7 +19,10 @@ from tests.planners.world.motions import KINDS
 from tests.worlds import box, problem_of
 
 SCENE = scene_of(
-    replace(problem_of([box(8.0, 5.0, 0.4, 0.6, 0.3), box(4.0, 8.5, 0.7, 0.4, 1.0)]), bounds=(0, 0, 60, 60))
+    replace(
+        problem_of([box(8.0, 5.0, 0.4, 0.6, 0.3), box(4.0, 8.5, 0.7, 0.4, 1.0)]),
+        bounds=(0.0, 0.0, 60.0, 60.0),
+    )
 )
 BARRIER = Barrier(0.01, 6.0, 0.0, 1.2, 0.003)  # of a range that always sees something
 STEP = 1e-5

@@ -7,9 +7,11 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from numba import TypingError
+from numba import TypingError, types
 from numba.core.compiler import Flags
 
 from planners.world.compiling import working_clock
@@ -128,6 +130,24 @@ def test_the_working_clock_does_not_count_compiling(tmp_path: Path, monkeypatch:
     assert jit(tripled)(2.0) == 6.0
     ended = time.perf_counter()
     assert working_clock() - working < ended - began  # although it was asked earlier and later
+
+
+def test_all_whole_numbers_are_one_kind_to_a_kernel_that_others_call(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planners.world.jit._CACHE", tmp_path)
+
+    @jit
+    def doubled(number: Any) -> Any:
+        return number + number
+
+    @jit
+    def summed(short: Any) -> Any:
+        return doubled(7) + doubled(number=short[0]) + doubled(len(short)) + doubled(0.25)
+
+    assert summed(np.array([5], np.int32)) == 26.5
+    kernel: Any = doubled
+    assert kernel._linked.signatures == [(types.int64,), (types.float64,)]
 
 
 @pytest.fixture
