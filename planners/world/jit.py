@@ -58,12 +58,14 @@ class _KernelLocator(InTreeCacheLocator):
     """Keeps a compiled kernel in the folder of the present state of all kernels' sources.
 
     Numba looks only at a kernel's own file for changes: after an edit to a kernel in another file, a compiled
-    caller would go on with the old one.
+    caller would go on with the old one. It also compiles again what was moved or copied with its folder.
     """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
-        self._cache_path = str(_CACHE / self.get_suitable_cache_subpath(file))
+        beside = Path(file).is_relative_to(_SOURCES.parent)
+        own = Path(file).parent.relative_to(_SOURCES.parent) if beside else None
+        self._cache_path = str(_CACHE / (own or self.get_suitable_cache_subpath(file)))
 
     def ensure_cache_path(self) -> None:
         """Make the folder; if it is a new one beside the sources, delete those of states long ago."""

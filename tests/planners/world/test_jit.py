@@ -2,6 +2,7 @@
 
 import gc
 import os
+import runpy
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ import pytest
 from numba import TypingError, types
 from numba.core.compiler import Flags
 
+import planners.world.jit
 from planners.world.compiling import working_clock
 from planners.world.jit import KEPT_BESIDE, KernelFiles, _Flags, forget_old_kernels, jit
 
@@ -106,6 +108,33 @@ def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(t
     mine.save("one trailer", "code for one trailer")
     for kind in ("one trailer", "two trailers"):
         assert later.load(kind) in (None, f"code for {kind}")
+
+
+MOVED = """
+from planners.world.jit import jit
+
+@jit
+def doubled(value):
+    return 2.0 * value
+"""
+
+
+def test_kernels_that_were_moved_with_their_folder_are_not_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def loaded(sources: Path) -> int:
+        monkeypatch.setattr(planners.world.jit, "_SOURCES", sources)
+        monkeypatch.setattr(planners.world.jit, "_CACHE", sources / "kernels")
+        doubled: Any = runpy.run_path(str(sources / "doubling.py"))["doubled"]
+        assert doubled(3.0) == 6.0
+        return sum(doubled.stats.cache_hits.values())
+
+    here, there = tmp_path / "here", tmp_path / "there"
+    (here / "planners").mkdir(parents=True)
+    (here / "planners" / "doubling.py").write_text(MOVED)
+    assert loaded(here / "planners") == 0
+    here.rename(there)
+    assert loaded(there / "planners") == 1
 
 
 def test_kernels_of_the_newest_states_of_the_sources_are_kept(tmp_path: Path) -> None:

@@ -14,16 +14,16 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
-from numba.core.caching import InTreeCacheLocator
 
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
-from planners.memory.plans.cell_masks import blocked_cells, masks_of
+from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
 from planners.ranked_plans import OF_PARTS
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
+from planners.world.jit import _CACHE
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.archives.libraries import save_library
@@ -40,7 +40,6 @@ from tests import worlds
 from tests.prepared.mlflow_database import with_mlflow_database
 from tests.storage.samples import a_memory
 
-ROOT = Path(__file__).parents[3]
 pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
     "ignore:.*type hint:UserWarning",
     "ignore:Operation with range",
@@ -208,14 +207,7 @@ def _installed(logged: dict[str, str], folder: Path) -> Path:
     assert f"code/{wheel.name}" in requirements.read_text().splitlines()
     with zipfile.ZipFile(wheel) as opened:
         opened.extractall(folder)
-    for path in folder.rglob("*.py"):
-        shutil.copystat(ROOT / path.relative_to(folder), path)
-    kernels = Path(blocked_cells.stats.cache_path).parent
-    copies, subpath = folder / "planners" / "__pycache__", InTreeCacheLocator.get_suitable_cache_subpath
-    for place in {path.parent for path in folder.rglob("*.py")}:
-        original = kernels / subpath(str(ROOT / place.relative_to(folder) / "any.py"))
-        if original.is_dir():
-            shutil.copytree(original, copies / kernels.name / subpath(str(place / "any.py")))
+    shutil.copytree(_CACHE, folder / "planners" / "__pycache__" / _CACHE.name)
     return folder
 
 
