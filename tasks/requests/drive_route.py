@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,12 +15,13 @@ from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.world.arrays import Pose
+from planners.world.compiling import working_clock
 from planners.world.problem import Plan
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
-from tasks.requests.assistant import Assistant
+from tasks.requests.assistant import WARM_WORK_S, Assistant
 from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
@@ -93,14 +93,14 @@ def drive_route(
 
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
-    asked = (x / scale, y / scale, heading), stops, motion, request.time_limit
+    asked = (x / scale, y / scale, heading), stops, motion
     with told_meanwhile("planning"):
         _drive_mirrored(router_over, canonical, *asked)
         OtherWork()()
         solver.seconds.clear()
-        began = time.perf_counter()
-        route = router.route(*asked)
-        seconds = time.perf_counter() - began
+        began = working_clock()
+        route = router.route(*asked, request.time_limit)
+        seconds = working_clock() - began
     if isinstance(route, Stuck):
         if drawing is not None:
             from dashboards.figures.stuck_picture import stuck_picture  # late: few routes are drawn
@@ -135,9 +135,8 @@ def _drive_mirrored(
     start: Pose,
     stops: Sequence[Stop],
     motion: tuple[float, ...],
-    time_limit: float | None,
 ) -> None:
-    """Find the route of the mirrored map: the code is ready then, but no problem of the route is known."""
+    """Look for a route across the mirrored map: code is ready then, but no problem of the route is known."""
     width = world.size[0]
     x, y, heading = start
     across = router_over(replace(world, occupied=world.occupied[:, ::-1].copy()))
@@ -153,7 +152,7 @@ def _drive_mirrored(
         for stop in stops
     ]
     turned = motion[:1] + tuple(-each for each in motion[1:])
-    across.route((width - x, y, math.pi - heading), asked, turned, time_limit)
+    across.route((width - x, y, math.pi - heading), asked, turned, WARM_WORK_S)
 
 
 def _refusal(

@@ -23,6 +23,7 @@ from storage.exchange.plans import read_plan
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import source_at
+from tasks.requests import drive_route
 from tests.planners.maps.agreement import cells_shape
 from tests.planners.memories import memory_of
 from tests.storage.samples import problem_with
@@ -113,6 +114,22 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert call(["verify", str(out), "--map", str(town / "town.yaml")]) == 0
     assert call(["verify", str(out), "--map", str(town / "town.map")]) == 1  # which lies elsewhere
     assert picture.stat().st_size > 10_000
+
+
+def test_how_long_a_route_is_rehearsed_does_not_change_it(
+    town: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plans = []
+    for seconds in (0.0, 60.0):
+        monkeypatch.setattr(drive_route, "WARM_WORK_S", seconds)
+        out = tmp_path / f"after-{seconds}.json"
+        asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--out", str(out)]
+        begin, end = placed(8.0, 6.0), placed(150.0, 190.0)
+        assert call([*asked, "--from", f"{begin[0]},{begin[1]},0.3", "--to", f"{end[0]},{end[1]}"]) == 0
+        plans.append(read_plan(out).plan)
+    assert plans[0] is not None
+    assert plans[1] is not None
+    np.testing.assert_array_equal(plans[0].states, plans[1].states)
 
 
 def test_a_route_stops_as_near_to_a_place_as_it_is_asked_to(town: Path, tmp_path: Path) -> None:
