@@ -108,13 +108,16 @@ def judge(
 def judgement_line(judged: Judgement, who: str = "the challenger") -> str:
     """The figures by which it was ``judged``, in one line about ``who``."""
     less = 100 * judged.columns["reduction"].mean()
+    time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
+    line = (
+        f"{who} is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
+        f"{judged.problems:,} problem{'' if judged.problems == 1 else 's'}, and plans in {time}"
+    )
+    if len(judged.columns) == 1:
+        return line
     counts = Counter(judged.columns["verdict"])
     named = ", ".join(f"{counts[each]} {each}" for each in (SOONER, LATER, FEWER, OPEN) if counts[each])
-    time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
-    return (
-        f"{who} is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
-        f"{judged.problems:,} problem{'' if judged.problems == 1 else 's'}, and plans in {time}: {named}"
-    )
+    return f"{line}; of {len(judged.columns)} comparisons: {named}"
 
 
 def judgement_tables(judged: Judgement) -> list[CellTable]:

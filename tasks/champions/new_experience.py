@@ -209,10 +209,15 @@ def _fresh(
 def _summary(memory: str, champion: Version, pending: PendingRetraining) -> str:
     """A line about a memory: its champion, the verdict on a newer version, the number of new experiences."""
     fresh_count = len(pending.fresh.get(memory, ()))
-    last = pending.last_judged[memory]
-    line = f"{memory}: champion is version {champion.number}"
+    news = f"{fresh_count:,} new experiences" if fresh_count else "nothing new was learned"
+    return f"{champion_line(memory, champion, pending.last_judged[memory])}; {news}"
+
+
+def champion_line(name: str, champion: Version | None, last: Version) -> str:
+    """The champion of a memory or library, and the verdict on the version that was judged last if newer."""
+    line = f"{name}: no champion" if champion is None else f"{name}: champion is version {champion.number}"
     if last.tag("verdict") == AWAITING:
         line += f", version {last.number} awaits approval (motion-memory promote)"
-    elif last.number != champion.number:
+    elif champion is None or last.number != champion.number:
         line += f", version {last.number} was {last.tag('verdict')}"
-    return f"{line}; {fresh_count:,} new experiences" if fresh_count else f"{line}; nothing new was learned"
+    return line

@@ -15,8 +15,8 @@ from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import read_gained, snapshot_ids
 from storage.vehicles.vehicle_files import label_of
 from storage.worlds.importing import ImportSettings
-from tasks.champions.new_experience import is_judged, next_number
-from tasks.registry.champion_registry import Registry, Version
+from tasks.champions.new_experience import champion_line, is_judged, next_number
+from tasks.registry.champion_registry import REFUSED, Registry, Version
 from tasks.requests.gather import check_asked_questions
 from tasks.requests.gather_pieces import GatherRequest
 from tasks.requests.question_sources import (
@@ -131,25 +131,30 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
     place = folder.gained_questions(label_of(vehicle))
     learned = [each.experience.problem for each in read_gained(place, vehicle)]
     champion = registry.aliased(asked.registered)
-    if champion is None:
+    if champion is not None and champion.tag("vehicle") not in ("", label_of(vehicle)):
+        raise UsageError(
+            f"{asked.registered} is a library of {champion.tag('vehicle')}: give this one another name."
+        )
+    judged = [each for each in registry.versions(asked.registered) if _counts(each, champion)]
+    if not judged:
         if not asked.sources and not learned:
             raise _nothing_to_gather(asked.name)
         line = f"{asked.name}: no champion yet; {_counted(len(learned), 'learned question')}"
         return PendingLibrary(None, number, True, True, line)
-    if champion.tag("vehicle") not in ("", label_of(vehicle)):
-        raise UsageError(
-            f"{asked.registered} is a library of {champion.tag('vehicle')}: give this one another name."
-        )
-    judged = [each for each in registry.versions(asked.registered) if is_judged(each, champion)]
     seen = {identity for each in judged for identity in snapshot_ids(place, each.tag("learned"))}
     new = sum(question.id not in seen and not is_held_back(question) for question in learned)
-    recipe, known = asked.recipe(), {each.tag("recipe") for each in (champion, *judged)}
-    line = f"{asked.name}: champion is version {champion.number}; "
+    recipe, known = asked.recipe(), {each.tag("recipe") for each in judged}
+    line = f"{champion_line(asked.name, champion, judged[-1])}; "
     line += f"{_counted(new, 'new question')} to learn from" if new else "nothing new was learned"
     if recipe not in known:
         line += f"{', and' if new else ', but'} it was not asked for in this way before"
-    is_anew = recipe != champion.tag("recipe")
+    is_anew = champion is None or recipe != champion.tag("recipe")
     return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
+
+
+def _counts(version: Version, champion: Version | None) -> bool:
+    """Whether what a version was made of is not new: it was judged, or, without a champion, refused."""
+    return version.tag("verdict") == REFUSED if champion is None else is_judged(version, champion)
 
 
 def check_there_is_something(data: Path, asked: LibraryRetraining) -> None:

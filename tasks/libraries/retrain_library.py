@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dashboards.cells import CellTable, as_markdown
 from dashboards.verdicts.drift import FEWEST
@@ -33,7 +33,7 @@ from tasks.libraries.judge_library import (
     too_few,
 )
 from tasks.libraries.pending_library import LibraryRetraining, PendingLibrary, pending_library
-from tasks.registry.champion_registry import Registry, Version
+from tasks.registry.champion_registry import FIRST, REFUSED, Registry, Version
 from tasks.registry.model_uris import memory_digest
 from tasks.registry.register_library import log_library
 from tasks.requests.gather import (
@@ -47,6 +47,8 @@ from tasks.settings.errors import RunError, UsageError
 from tasks.tracking.artifacts import publish_judgements
 from tasks.tracking.logbook import judgement_metrics
 from tasks.tracking.mlflow_runs import tracker
+
+HARM: Final = "robots are there later with it than without a memory"
 
 _LOG = logging.getLogger(__name__)
 
@@ -77,7 +79,8 @@ def retrain_library(
     """Gather a library with what was learned since the champion, and promote it if robots are there sooner.
 
     Questions of files and learned ones are split by what they ask: one in four is never gathered, and only
-    judges. The first library becomes the champion. If the command is killed, the same command goes on.
+    judges. The first library becomes the champion, unless robots are later with it than without a memory.
+    If the command is killed, the same command goes on.
 
     Args:
         data: the data folder.
@@ -137,6 +140,8 @@ def _retrained(
     version, verdict, markdown = _registered(folder, asked, registry, pending, made)
     ours = None if judgement is None else judgement.champion
     summary = summary_of(version, before, verdict, ours)
+    if verdict == REFUSED and before is None:
+        summary = f"{version.name} version {version.number} is {verdict}: {HARM}"
     faults = settle(registry, [(version, verdict)])
     if flow is not None:
         publish_judgements(title, [(asked.name, summary, markdown)])
@@ -144,8 +149,8 @@ def _retrained(
         raise RunError(" ".join(faults))
     if judgement is None:
         return RetrainedLibrary(out, counts, version, verdict, summary, "", [])
-    if judgement.alone.high_s < 0.0:
-        _LOG.warning("With %s robots are there later than without a memory.", title)
+    if verdict != REFUSED and judgement.alone.high_s < 0.0:
+        _LOG.warning("%s: %s.", title, HARM)
     tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
     return RetrainedLibrary(out, counts, version, verdict, summary, _beside(judgement), tables)
 
@@ -159,7 +164,7 @@ def _registered(
 ) -> tuple[Version, str, str]:
     """Log a library and the judgement in MLflow, and register it: the version, the verdict, and its text."""
     ours = None if made.judgement is None else made.judgement.champion
-    verdict = verdict_on(ours, asked.approve)
+    verdict = _verdict(made.judgement, asked.approve)
     parameters = {
         "sources": shlex.join([*asked.sources, *([made.learned] if made.learned else [])]),
         **{name: getattr(asked, name) for name in ("plans", "poses", "difficulty", "test_problems")},
@@ -189,6 +194,14 @@ def _registered(
     return version, verdict, markdown
 
 
+def _verdict(judgement: LibraryJudgement | None, approve: bool) -> str:
+    """What becomes of a library: the first must do no harm, others have to be better than the champion."""
+    if judgement is None or judgement.champion is not None:
+        return verdict_on(judgement and judgement.champion, approve)
+    does_harm = judgement.alone.problems >= FEWEST and judgement.alone.high_s < 0.0
+    return REFUSED if does_harm else FIRST
+
+
 def _held_back(
     asked: LibraryRetraining, snapshot: Path | None, number: int, library: Path, is_first: bool
 ) -> GatherRequest:
@@ -207,9 +220,10 @@ def _held_back(
     )
     count = len(questions_of(request))
     if count < FEWEST and not is_first:
+        more = "raise --test-problems" if count == asked.test_problems else "solve more with --learn"
         raise RunError(
-            f"{asked.name}: {too_few(count)}; raise --test-problems, or name a class, a family, a map or "
-            "worlds among its sources."
+            f"{asked.name}: {too_few(count)}; {more}, or name a class, a family, a map or worlds among its "
+            "sources."
         )
     return request
 
@@ -231,8 +245,10 @@ def _judged(
 def _markdown(made: _Challenger, verdict: str) -> str:
     judgement = made.judgement
     parts = [f"Library *{made.title}*, learned: `{made.learned or 'nothing'}`."]
-    if judgement is None or judgement.champion is None:
+    if verdict == FIRST:
         parts.append("There was no champion. This library is the first; all its plans were checked.")
+    elif judgement is None or judgement.champion is None:
+        parts.append(f"**{verdict}**: {HARM}.")
     else:
         parts.append(judgement_markdown(judgement.champion, verdict))
     if judgement is not None:

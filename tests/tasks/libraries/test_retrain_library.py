@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -81,20 +81,32 @@ def _retrain(data: Path, asked: LibraryRetraining = ASKED) -> RetrainedLibrary:
     return made
 
 
-def _timed(monkeypatch: pytest.MonkeyPatch, more_is_better: bool) -> None:
+def _timed(monkeypatch: pytest.MonkeyPatch, seconds: Callable[[int], float]) -> None:
     """Answers whose time follows from the number of plans: a clock would decide who is champion."""
 
     def timed(*asked: Any, **named: Any) -> Attempt:
         plans = 0 if asked[4] is None else len(asked[4].plans)
-        return replace(solve(*asked, **named), planning_seconds=1.0 / (1 + plans) if more_is_better else 1.0)
+        return replace(solve(*asked, **named), planning_seconds=seconds(plans))
 
     monkeypatch.setattr(judging, "solve", timed)
+
+
+def _sooner(plans: int) -> float:
+    return 1.0 / (1 + plans)
+
+
+def _later(plans: int) -> float:
+    return 100.0 * (1 + plans)  # longer than any drive that a plan may save
+
+
+def _alike(_plans: int) -> float:
+    return 1.0
 
 
 def test_a_library_grows_by_what_was_learned_and_is_judged_by_what_it_never_saw(
     data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _timed(monkeypatch, more_is_better=True)
+    _timed(monkeypatch, _sooner)
     first = _retrain(data)
     assert (first.verdict, _champion(data)) == (FIRST, 1)
     assert task.retrain_library(data, ASKED) is None  # nothing new
@@ -144,7 +156,7 @@ def test_a_library_grows_by_what_was_learned_and_is_judged_by_what_it_never_saw(
 def test_a_library_that_is_no_better_is_refused_and_not_judged_again(
     data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _timed(monkeypatch, more_is_better=False)
+    _timed(monkeypatch, _alike)
     _retrain(data)
     more = ASKED._replace(plans=4)
     assert "not asked for in this way" in library_dry_run(data, more)
@@ -152,6 +164,22 @@ def test_a_library_that_is_no_better_is_refused_and_not_judged_again(
     assert (second.verdict, _champion(data)) == (REFUSED, 1)
     for asked in (ASKED, more):
         assert task.retrain_library(data, asked) is None
+        assert "version 1, version 2 was refused; nothing new was learned" in library_dry_run(data, asked)
+
+
+def test_a_first_library_that_makes_robots_later_is_no_champion(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _timed(monkeypatch, _later)
+    first = _retrain(data)
+    registry = Registry(open_data_folder(data))
+    assert (first.verdict, registry.aliased(ASKED.registered)) == (REFUSED, None)
+    assert task.retrain_library(data, ASKED) is None  # it would come out alike
+    assert "no champion, version 1 was refused; nothing new was learned" in library_dry_run(data, ASKED)
+    _timed(monkeypatch, _sooner)
+    _learn(data, 5, 8)
+    second = _retrain(data)
+    assert (second.verdict, _champion(data)) == (FIRST, 2)
 
 
 @given(st.dictionaries(st.text("abc", min_size=1, max_size=2), st.integers(1, 50), min_size=1, max_size=6))
@@ -225,7 +253,7 @@ def test_without_sources_no_data_folder_is_made(
 
 
 def test_two_questions_of_a_champion_decide_nothing(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _timed(monkeypatch, more_is_better=True)
+    _timed(monkeypatch, _sooner)
     few = ASKED._replace(test_problems=1)
     _retrain(data, few)
     _learn(data, 5, 4)
