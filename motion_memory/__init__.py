@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
+from motion_memory.answers import Answer, RouteAnswer
 from motion_memory.files import read_map, read_problems, read_worlds, solve_many
 from motion_memory.loading import load
-from motion_memory.memory import Answer, Memory
+from motion_memory.memory import Memory
 from planners.maps.occupancy_map import OccupancyMap
 from planners.ranked_plans import RankedPlan
 from planners.world.problem import Arrival, Plan, Problem
@@ -31,6 +32,7 @@ __all__ = [
     "PlanFaultError",
     "Problem",
     "RankedPlan",
+    "RouteAnswer",
     "RunError",
     "StorageError",
     "UsageError",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
+from motion_memory.answers import RouteAnswer
 from motion_memory.array_problems import motion_given, numbers_given
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.leg_search import Solve
@@ -16,7 +16,6 @@ from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.world.alignment import scaled
 from planners.world.arrays import Point, Pose
-from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
@@ -33,18 +32,6 @@ from tasks.requests.map_routes import (
 )
 from tasks.settings.checks import check_time_limit, is_number
 from tasks.settings.errors import UsageError
-
-
-@dataclass(frozen=True, eq=False)
-class RouteAnswer:
-    """The result of looking for a drive across a map."""
-
-    status: str  # "solved" or "stuck"
-    source: str | None  # "searched" if any local plan was, else "repaired" or "recalled"; None when stuck
-    plan: Plan | None  # in the map's frame and metres; None when stuck
-    why: str | None  # one clause: why and where it is stuck, or that the time is up; None when solved
-    local_plans: int  # how many were looked for
-    planning_seconds: float  # of the whole search, in which the judge looks at each local plan
 
 
 class MapRouter:
@@ -144,7 +131,8 @@ class MapRouter:
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
         driven = scaled(in_frame_of(self._world, plan, scale), scale)
-        return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds)
+        found = tuple((*each, self._vehicle) for each in route.solved(scale))
+        return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds, found)
 
 
 def _finite(name: str, given: Sequence[float], *meanings: str) -> list[float]:

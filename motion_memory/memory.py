@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from motion_memory.answers import Answer, RouteAnswer
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.extras import may_lack
 from motion_memory.plain import plain
@@ -35,22 +36,6 @@ from tasks.settings.errors import UsageError
 if TYPE_CHECKING:
     from motion_memory.map_router import MapRouter
     from planners.maps.occupancy_map import OccupancyMap
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """The result of planning for one problem."""
-
-    problem_id: str
-    status: str  # "solved", or how planning failed (planners.search.outcome.Status)
-    source: str | None  # "recalled", "repaired" or "searched"; None when not solved
-    plan: Plan | None  # in the frame and units of the given problem; None when not solved
-    planning_seconds: float  # from convex pieces in the canonical frame to the plan
-    call_seconds: (
-        float  # of the whole call, reading and checking the problem included, but not judging the plan
-    )
-    # what ``learn`` keeps of a plan that no memory had: the problem, canonical, the attempt and who drives
-    _found: tuple[Problem, Attempt, Vehicle] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,15 +218,15 @@ class Memory:
         near = shifted(plan, (-read.offset[0], -read.offset[1]))
         return faults(read, scaled(near, 1.0 / read.scale), self.vehicle)
 
-    def learn(self, answers: Answer | Iterable[Answer], data: str | Path) -> int:
+    def learn(self, answers: Answer | RouteAnswer | Iterable[Answer | RouteAnswer], data: str | Path) -> int:
         """Keep plans that no memory had, for later libraries and runs (docs/learning-on-the-job.md).
 
         Each is judged once more; call this when the robot has time. Several processes may write to the same
         folder, and what is learned again changes nothing.
 
         Args:
-            answers: one or more answers of ``plan`` or ``plan_arrays``; those without a plan, or with a plan
-                of the memory, are left out.
+            answers: one or more answers of ``plan`` or ``plan_arrays``, or of a router's ``route``, of which
+                each local plan counts; what has no plan, or a plan of the memory, is left out.
             data: the data folder, which is made if it is not there.
 
         Returns:
@@ -258,17 +243,17 @@ class Memory:
         check_path("data", data)
         solved = []
         for answer in answers if isinstance(answers, Iterable) else [answers]:
-            if not isinstance(answer, Answer) or (answer.source in NEW and answer._found is None):
+            lacks_its_plan = isinstance(answer, Answer) and answer.source in NEW and not answer._found
+            if lacks_its_plan or not isinstance(answer, Answer | RouteAnswer):
                 raise UsageError(
-                    f"{short(answer)} is no answer of plan or plan_arrays: give what they return."
+                    f"{short(answer)} is no answer of plan, plan_arrays or route: give what they return."
                 )
-            if answer._found is None:
-                continue
-            problem, attempt, vehicle = answer._found
-            if vehicle != self.vehicle:
-                names = [name_of(each) for each in (vehicle, self.vehicle)]
-                raise UsageError(f"{names[0]} drives the answer to {problem.id}, and not {names[1]}.")
-            solved.append(Solved(problem, check_attempt(problem, attempt, set(), vehicle)))
+            for problem, attempt, vehicle in answer._found:
+                if vehicle != self.vehicle:
+                    names = [name_of(each) for each in (vehicle, self.vehicle)]
+                    asked = problem.id or "a local problem"
+                    raise UsageError(f"{names[0]} drives the answer to {asked}, and not {names[1]}.")
+                solved.append(Solved(problem, check_attempt(problem, attempt, set(), vehicle)))
         return remember(Path(data), solved, self.vehicle)
 
     def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
@@ -295,7 +280,7 @@ class Memory:
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
-        found = (canonical, attempt, self.vehicle) if attempt.source in NEW else None
+        found = ((canonical, attempt, self.vehicle),) if attempt.source in NEW else ()
         return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found)
 
     def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:

@@ -8,8 +8,9 @@ from typing import Any
 
 from prefect import task
 
+from motion_memory.answers import Answer
 from motion_memory.loading import load
-from motion_memory.memory import Answer, Memory
+from motion_memory.memory import Memory
 from planners.world.problem import Problem
 
 

@@ -62,7 +62,7 @@ def retrain_library(
     options: LibraryOptions = _USUAL,
     reading: MapOptions = _AS_IT_IS,
 ) -> int:
-    """Gather a library with what solve and plan have learned, and promote it if robots are there sooner.
+    """Gather a library with what was learned at work, and promote it if robots are there sooner.
 
     A repeated command continues where it stopped, and does nothing where nothing new was learned.
 

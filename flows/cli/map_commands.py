@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
-from flows.cli.terminal import SHORT, write, write_answer, write_files, write_for_people
+from flows.cli.terminal import SHORT, write, write_answer, write_files, write_for_people, write_learned
 
 if TYPE_CHECKING:
     from tasks.requests.adapt_pieces import AdaptRequest, Driven
@@ -82,7 +82,7 @@ def gather(
     Args:
         sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
             and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
-            problems: these are the questions. Data folders: what solve and plan have learned there.
+            problems: these are the questions. Data folders: what was learned there at work.
         out: Folder of the library, a new one.
         plans: How many questions to have answered; where fewer can be, the library holds those. Default:
             1000, or fewer if all sources are files of problems and data folders that hold no more.
@@ -182,6 +182,7 @@ def route(
     time_limit: float | None = None,
     out: Path | None = None,
     picture: Path | None = None,
+    learn: Path | None = None,
     options: SolveOptions = _USUAL,
     reading: MapOptions = _AS_IT_IS,
 ) -> None:
@@ -209,6 +210,7 @@ def route(
             depends on the machine.
         out: Where to write the plan, .json.
         picture: Where to draw the route, .png, .svg or .pdf.
+        learn: Data folder that remembers the local plans of the route that no memory had.
         options: How to solve local problems.
         reading: How the map is read.
     """
@@ -226,11 +228,12 @@ def route(
         "start_hitch": start_hitch,
     }
     request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius, time_limit)
-    driven = drive_route(path, format, request, assistant, settings, out, picture)
+    driven = drive_route(path, format, request, assistant, settings, out, picture, learn)
     write_for_people(options.vehicle_line(assistant.settings))
     if driven.legs is not None:
         write(driven.legs)
     write_answer(*driven.summary, **driven.answer)
     write_files(plan=out if driven.failure is None else None, picture=picture)
+    write_learned(learn, driven.learned)
     if driven.failure is not None:
         raise driven.failure

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty, PlannerName, SourceName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
-from flows.cli.terminal import write, write_answer, write_files, write_for_people
+from flows.cli.terminal import write, write_answer, write_files, write_for_people, write_learned
 
 if TYPE_CHECKING:
     from tasks.requests.problem_parts import PartResult, SolveRequest
@@ -96,7 +96,7 @@ def plan(
         lines.append(f"{attempt.source}, {times}{gears_told(answer)}{sideways}")
     write_answer(*lines, **answer)
     write_files(plan=written, picture=picture)
-    _write_learned(learn, learned)
+    write_learned(learn, learned)
     if failure is not None:
         raise RunError(failure)
 
@@ -181,24 +181,8 @@ def solve(
     write_for_people(options.vehicle_line(settings, problems))
     _write_summary(solved)
     write_files(rows=out, plans=plans, picture=picture)
-    _write_learned(learn, solved.learned)
+    write_learned(learn, solved.learned)
     write(*(f"watched  {line}" for line in solved.drift))
-
-
-def _write_learned(data: Path | None, count: int | None) -> None:
-    """Write how many plans --learn found to keep, and where they lie with those of before.
-
-    None stands for a count that an earlier command has told.
-    """
-    from tasks.inputs.gained_on_the_job import has_gained
-
-    if data is None:
-        return
-    if count is not None:
-        plans = f"{count or 'no'} plan{'' if count == 1 else 's'}"
-        write(f"found    {plans} that no memory had")
-    if has_gained(data):
-        write_files(learned=data)
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from flows.cli.document import Document
@@ -84,6 +85,22 @@ def write_files(**paths: object) -> None:
         _telling.document.files.update(written)
     else:
         write(*(f"{name:8} {path}" for name, path in written.items()))
+
+
+def write_learned(data: Path | None, count: int | None) -> None:
+    """Write how many plans --learn found to keep, and where they lie with those of before.
+
+    None stands for a count that an earlier command has told.
+    """
+    from tasks.inputs.gained_on_the_job import has_gained
+
+    if data is None:
+        return
+    if count is not None:
+        plans = f"{count or 'no'} plan{'' if count == 1 else 's'}"
+        write(f"found    {plans} that no memory had")
+    if has_gained(data):
+        write_files(learned=data)
 
 
 def write_error(line: str) -> None:

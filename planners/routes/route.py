@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from planners.attempt import Attempt
 from planners.routes.legs import Leg, joined
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
@@ -38,6 +39,17 @@ class Route:
     def source(self) -> str:
         """Where it comes from: "searched" if any leg was, else "repaired" if any was, else "recalled"."""
         return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
+
+    def solved(self, scale: float) -> list[tuple[Problem, Attempt]]:
+        """Each local problem of the drive once, without a name, and the attempt that solved it.
+
+        Args:
+            scale: metres of the map in a canonical one.
+        """
+        by_name = {
+            leg.problem.id: (replace(leg.problem, id="", scale=scale), leg.attempt) for leg in self.legs
+        }
+        return list(by_name.values())
 
     def least_seconds(self, vehicle: Vehicle) -> float:
         """Return how long as many metres take at full speed, from the start's to rest at each stop."""

@@ -21,6 +21,7 @@ from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
+from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import WARM_WORK_S, Assistant
 from tasks.requests.map_routes import (
     LocalSolver,
@@ -44,6 +45,7 @@ class DrivenRoute(NamedTuple):
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
     answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of ...
     failure: UsageError | RunError | None = None  # ... or, if there is none, those of ``Stuck.fields``
+    learned: int = 0  # local plans that no memory had and that are kept
 
 
 def drive_route(
@@ -54,6 +56,7 @@ def drive_route(
     settings: ImportSettings,
     out: Path | None,
     drawing: Path | None,
+    learn: Path | None = None,
 ) -> DrivenRoute:
     """Plan a route across a map, check it as one plan, and write plan and picture.
 
@@ -65,6 +68,7 @@ def drive_route(
         settings: how to read the map, and the metres of the map in a canonical metre.
         out: where to write the plan, or None.
         drawing: where to draw it, or None.
+        learn: the data folder to which the local plans of the drive are added that no memory had, or None.
 
     Raises:
         UsageError: an option is malformed, start or goal cannot be used, or an output would be written over
@@ -114,6 +118,9 @@ def drive_route(
     record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
+    learned = 0
+    if learn is not None:
+        learned = remember(learn, [Solved(*each) for each in route.solved(scale)], assistant.vehicle)
     summary = route_summary(route, plan, stops, assistant, scale, solver.seconds, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late, as above
@@ -126,7 +133,8 @@ def drive_route(
         "local_plans": len(solver.seconds),
         "seconds": seconds,
     }
-    return DrivenRoute(route_table(route, assistant, scale), summary, plan_answer(record, out, True) | more)
+    answer = plan_answer(record, out, True) | more
+    return DrivenRoute(route_table(route, assistant, scale), summary, answer, learned=learned)
 
 
 def _drive_mirrored(

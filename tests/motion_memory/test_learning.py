@@ -64,14 +64,13 @@ def test_what_a_memory_had_is_not_learned(memory: motion_memory.Memory, tmp_path
 def test_a_plan_that_is_wrong_is_not_learned(tmp_path: Path) -> None:
     alone = motion_memory.load(None, warm=False, judged=False)
     answer = alone.plan(fields_of(QUESTIONS[0]))
-    assert answer._found is not None
-    asked, attempt, vehicle = answer._found
+    ((asked, attempt, vehicle),) = answer._found
     assert attempt.plan is not None
     off = attempt.plan.states.copy()
     off[3:, 0] += 0.1
     wrong = replace(attempt, plan=Plan(off, attempt.plan.controls, attempt.plan.dt))
     with pytest.raises(motion_memory.PlanFaultError):
-        alone.learn([answer, replace(answer, _found=(asked, wrong, vehicle))], tmp_path / "data")
+        alone.learn([answer, replace(answer, _found=((asked, wrong, vehicle),))], tmp_path / "data")
     assert not (tmp_path / "data").exists()
 
 

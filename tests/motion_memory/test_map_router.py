@@ -15,7 +15,10 @@ import pytest
 
 import motion_memory
 from flows.cli.main import call
-from planners.world.vehicles.vehicle import VEHICLES
+from planners.world.authority.authority import faults
+from planners.world.vehicles.vehicle import CAR, VEHICLES
+from storage.places.data_folder import DataFolder
+from storage.tables.gained_experiences import read_gained
 from tests.motion_memory.test_public_api import NOT_FOR_ROBOTS, ROOT
 from tests.storage.worlds.samples import town_cells, write_ros
 
@@ -66,6 +69,30 @@ def test_a_map_is_asked_again_and_answers_as_the_command_does(
     other = router.route(begin, [pose])
     assert math.dist(other.plan.states[-1, :2], pose[:2]) <= 0.1
     assert abs(math.remainder(other.plan.states[-1, 2] - pose[2], math.tau)) <= 0.05
+
+
+def test_a_route_teaches_what_the_command_learns_of_it_and_nothing_twice(
+    file: Path, world: motion_memory.OccupancyMap, alone: motion_memory.Memory, router: Any, tmp_path: Path
+) -> None:
+    begin, pose = world.pose(*POSE), world.pose(8.0, 90.0, 1.5)
+    asked = ["route", str(file), "--learn", str(tmp_path / "command")]
+    assert call([*asked, "--from", ",".join(map(str, begin)), "--to", ",".join(map(str, pose))]) == 0
+    answer = router.route(begin, [pose])
+    for _ in range(2):
+        assert alone.learn(answer, tmp_path / "robot") > 0
+    learned = {
+        each.experience.problem.id: each.experience
+        for each in read_gained(DataFolder(tmp_path / "robot").gained_questions("car"), CAR)
+    }
+    commanded = read_gained(DataFolder(tmp_path / "command").gained_questions("car"), CAR)
+    assert {each.experience.problem.id for each in commanded} == set(learned)
+    assert not any(faults(each.problem, each.plan, CAR) for each in learned.values())
+    assert any(
+        each.problem.arrival is not None and each.problem.arrival.heading is not None
+        for each in learned.values()
+    )  # the way into the pose
+    stuck = router.route(begin, [world.pose(8.0, 90.0, 1.5)], time_limit=1e-9)
+    assert alone.learn([stuck], tmp_path / "robot") == 0
 
 
 def test_own_cells_at_a_scale_are_driven_over_in_their_own_metres(alone: motion_memory.Memory) -> None:
