@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 EXPERIMENT: Final = "motion-memory"
 RUN_TAG: Final = "motion_memory.run"  # the name of the run's folder
 STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
+WHOLE: Final = ("run", "gather")  # stages that are no part of a run, which has the name of what it makes
 KEY_TAG: Final = "motion_memory.key"  # digest of what the logged content depends on
 MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was logged with its encoder
 MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
@@ -106,7 +107,7 @@ class Tracker:
             client.update_run(run_id, status="RUNNING")
         else:
             own = {RUN_TAG: run_name, STAGE_TAG: stage} | ({PARENT_TAG: parent} if parent else {})
-            name = run_name if stage == "run" else stage
+            name = run_name if stage in WHOLE else stage
             run_id = str(client.create_run(self._experiment, tags=own, run_name=name).info.run_id)
         self.tag(run_id, {**provenance(), **tags})
         try:

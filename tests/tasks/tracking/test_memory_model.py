@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import sqlite3
 import subprocess
 import sys
 import zipfile
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,6 +117,9 @@ def test_a_library_is_registered_once_and_loaded_by_its_address(
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     named = [register_library("docks", folder, CAR, {"sources": "random"}, {"plans": 12}) for _ in range(2)]
     assert named == ["models:/docks/1", "models:/docks/1"]
+    with closing(sqlite3.connect(tmp_path / "data" / "mlflow.db")) as database:
+        ((run,),) = database.execute("SELECT name FROM runs").fetchall()
+    assert "docks" in run  # libraries can be told apart in MLflow's list
     loaded = load_from(named[0], CAR)
     assert isinstance(loaded, PlanLibrary)
     assert loaded.questions == library.questions
