@@ -31,7 +31,7 @@ from tasks.requests.gather_pieces import (
     GatherPiece,
     GatherRequest,
     gather_pieces,
-    read_sources,
+    numbers_of,
 )
 from tasks.requests.part_folder import (
     do_here,
@@ -228,10 +228,10 @@ def answers_of(
         RunError: no question could be answered.
     """
     with unfinished(request.out):
-        if flow is None or workers == 1 or request.plans <= FEW_PLANS:
+        at_most = min(request.plans, numbers_of(request))  # a wrong source is told before workers start
+        if flow is None or workers == 1 or at_most <= FEW_PLANS:
             results = gather_pieces(request, partial(do_here, GATHER))
         else:
-            read_sources(request)  # so that a wrong one is told before workers start
             with part_workers(request.out, workers):
                 results = flow(request)
         kept, tried = _kept(request, results)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -144,7 +145,7 @@ def gather_pieces(
     Returns:
         the results of all pieces from the first on. They do not depend on who does how many at a time.
     """
-    longest = max(source.most for source in read_sources(request)) * len(request.sources)
+    longest = numbers_of(request)
     results: list[Gathered] = []
     answered = asked = 0
     most = GIVE_UP * request.plans
@@ -152,12 +153,17 @@ def gather_pieces(
     while (
         answered < request.plans and (asked or len(results) * PIECE) < most and len(results) * PIECE < longest
     ):
-        missing = -(-(request.plans - answered) // PIECE)
+        missing = math.ceil(min(request.plans - answered, longest - len(results) * PIECE) / PIECE)
         found = do([GatherPiece(request, len(results) + i) for i in range(missing)])
         answered += sum(len(set(each.rows)) for each in found)
         asked += sum(len(each.asked) for each in found)
         results += found
     return results
+
+
+def numbers_of(request: GatherRequest) -> float:
+    """How many numbers questions have at most, as the sources take turns; no end where they are drawn."""
+    return max(source.most for source in read_sources(request)) * len(request.sources)
 
 
 def read_sources(request: GatherRequest) -> list[QuestionSource]:

@@ -345,6 +345,21 @@ def test_a_misspelt_family_is_told_with_the_nearest_name(
     assert "nearest is 'perpendicular'" in capsys.readouterr().err
 
 
+def test_no_more_is_asked_than_files_hold(tmp_path: Path) -> None:
+    problems = tmp_path / "asked.jsonl"
+    write_problems(problems, [strewn(number, 10) for number in range(3)])
+    sources = (str(problems), str(problems))
+    request = pieces.GatherRequest(sources, tmp_path, 1000, 0.0, "standard", ImportSettings())
+    done: list[int] = []
+
+    def do(given: Sequence[pieces.GatherPiece]) -> list[pieces.Gathered]:
+        done.extend(each.index for each in given)
+        return [pieces.Gathered([], []) for _ in given]
+
+    pieces.gather_pieces(request, do)
+    assert done == [0]  # of six numbers
+
+
 def test_where_there_is_no_room_for_any_question_gathering_ends(tmp_path: Path) -> None:
     request = pieces.GatherRequest(("random",), tmp_path, 3, 0.0, "standard", ImportSettings())
     done = pieces.gather_pieces(request, lambda given: [pieces.Gathered([], []) for _ in given])
