@@ -128,7 +128,7 @@ GATHER: Final = Job(
     result=Gathered,
     output=lambda piece: piece.shard,
     is_whole=is_readable,
-    units=lambda piece: PIECE,
+    units=lambda piece: int(min(PIECE, numbers_of(piece.request) - piece.index * PIECE)),
     unit="questions",
 )
 
