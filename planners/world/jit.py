@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
@@ -36,14 +37,27 @@ from numba.extending import intrinsic, overload, typeof_impl
 from planners.world.compiling import listen
 
 _SOURCES = Path(__file__).parents[1]
+_IMPORTED = re.compile(rb"^ *from (planners[\w.]+) import ", re.MULTILINE)
+
+
+def _sources_of_kernels() -> dict[Path, bytes]:
+    """All files that hold kernels, and those that they import, whose constants are in compiled kernels."""
+    texts = {path: path.read_bytes() for path in _SOURCES.rglob("*.py")}
+    found: dict[Path, bytes] = {}
+    waiting = [path for path, text in texts.items() if b"planners.world.jit" in text]
+    while waiting:
+        path = waiting.pop()
+        if path in texts and path not in found:
+            found[path] = texts[path]
+            for module in _IMPORTED.findall(texts[path]):
+                waiting.append(_SOURCES.parent.joinpath(*module.decode().split(".")).with_suffix(".py"))
+    return found
 
 
 def _digest_of_sources() -> str:
     digest = hashlib.sha256()
-    for source in sorted(_SOURCES.rglob("*.py")):
-        text = source.read_bytes()
-        if b"planners.world.jit" in text:  # other files hold no kernel
-            digest.update(text)
+    for _, text in sorted(_sources_of_kernels().items()):
+        digest.update(text)
     return digest.hexdigest()[:16]
 
 
@@ -265,14 +279,14 @@ class _Linked(CPUDispatcher):
         self._cache = _LinkedCache(py_func)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Take all whole numbers as one kind: what is compiled for a known one, as 0, serves any other."""
+        """Take a whole number that is known, as 0, or of 32 bits as any other: one code serves all."""
         widened = {name: _widened(kind) for name, kind in kws.items()}
         return super().get_call_template([_widened(kind) for kind in args], widened)
 
 
 def _widened(kind: Any) -> Any:
     kind = types.unliteral(kind)
-    return types.int64 if kind in types.signed_domain else kind
+    return types.int64 if kind == types.int32 else kind
 
 
 class _Kernel(CPUDispatcher):

@@ -110,6 +110,25 @@ def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(t
         assert later.load(kind) in (None, f"code for {kind}")
 
 
+IMPORTED = """
+import importlib, sys
+from pathlib import Path
+from planners.world.jit import _SOURCES, _sources_of_kernels
+
+files = _sources_of_kernels()
+for path in list(files):
+    importlib.import_module(".".join(path.relative_to(_SOURCES.parent).with_suffix("").parts))
+loaded = {Path(module.__file__) for name, module in list(sys.modules.items()) if name.startswith("planners.")}
+missing = {path for path in loaded if path.name != "__init__.py"} - set(files)
+assert not missing, missing
+"""
+
+
+def test_what_kernels_are_compiled_from_includes_all_that_their_files_import() -> None:
+    done = subprocess.run([sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 MOVED = """
 from planners.world.jit import jit
 
