@@ -131,7 +131,7 @@ class MapRouter:
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
         driven = scaled(in_frame_of(self._world, plan, scale), scale)
-        found = tuple((*each, self._vehicle) for each in route.solved(scale))
+        found = tuple((*each, self._vehicle) for each in route.news(scale))
         return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds, found)
 
 
@@ -147,6 +147,8 @@ def _check_map(world: OccupancyMap) -> None:
     """Raise UsageError unless a map is one."""
     if not isinstance(world, OccupancyMap):
         raise UsageError(f"The map is {short(world)}; give an OccupancyMap, such as read_map returns.")
+    if not isinstance(world.name, str) or not world.name or not world.name.isprintable():
+        raise UsageError(f"The map's name is {short(world.name)}; give a text of printable characters.")
     occupied = world.occupied
     is_grid = isinstance(occupied, np.ndarray) and occupied.dtype == np.bool_ and occupied.ndim == 2
     if not (is_grid and occupied.size):

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from planners.attempt import Attempt
+from planners.attempt import NEW, Attempt
 from planners.routes.legs import Leg, joined
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
@@ -40,14 +40,16 @@ class Route:
         """Where it comes from: "searched" if any leg was, else "repaired" if any was, else "recalled"."""
         return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
 
-    def solved(self, scale: float) -> list[tuple[Problem, Attempt]]:
-        """Each local problem of the drive once, without a name, and the attempt that solved it.
+    def news(self, scale: float) -> list[tuple[Problem, Attempt]]:
+        """Each local problem whose plan no memory had, once and without a name, and how it was solved.
 
         Args:
             scale: metres of the map in a canonical one.
         """
         by_name = {
-            leg.problem.id: (replace(leg.problem, id="", scale=scale), leg.attempt) for leg in self.legs
+            leg.problem.id: (replace(leg.problem, id="", scale=scale), leg.attempt)
+            for leg in self.legs
+            if leg.source in NEW
         }
         return list(by_name.values())
 

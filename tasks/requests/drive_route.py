@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dashboards.cells import CellTable
 from planners.maps.occupancy_map import OccupancyMap
@@ -22,7 +22,7 @@ from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
 from tasks.inputs.gained_on_the_job import Solved, remember
-from tasks.requests.assistant import WARM_WORK_S, Assistant
+from tasks.requests.assistant import Assistant
 from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
@@ -36,6 +36,8 @@ from tasks.requests.route_summary import legs_from_memory, route_summary, route_
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file, check_time_limit
 from tasks.settings.errors import RunError, UsageError
+
+REHEARSED_S: Final = 5.0  # that the mirrored route may take: a longer one has needed nearly all code by then
 
 
 class DrivenRoute(NamedTuple):
@@ -120,7 +122,7 @@ def drive_route(
         write_plan(out, record)
     learned = 0
     if learn is not None:
-        learned = remember(learn, [Solved(*each) for each in route.solved(scale)], assistant.vehicle)
+        learned = remember(learn, [Solved(*each) for each in route.news(scale)], assistant.vehicle)
     summary = route_summary(route, plan, stops, assistant, scale, solver.seconds, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late, as above
@@ -160,7 +162,7 @@ def _drive_mirrored(
         for stop in stops
     ]
     turned = motion[:1] + tuple(-each for each in motion[1:])
-    across.route((width - x, y, math.pi - heading), asked, turned, WARM_WORK_S)
+    across.route((width - x, y, math.pi - heading), asked, turned, REHEARSED_S)
 
 
 def _refusal(

@@ -154,6 +154,9 @@ def test_bad_questions_get_one_line(
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
+        ({"name": "a/b\n.."}, "name"),
+        ({"name": ""}, "name"),
+        ({"name": 7}, "name"),
         ({"occupied": np.zeros((3, 3))}, "occupied"),
         ({"occupied": np.zeros((0, 3), bool)}, "occupied"),
         ({"occupied": [[True]]}, "occupied"),

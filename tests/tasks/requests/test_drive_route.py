@@ -121,7 +121,7 @@ def test_how_long_a_route_is_rehearsed_does_not_change_it(
 ) -> None:
     plans = []
     for seconds in (0.0, 60.0):
-        monkeypatch.setattr(drive_route, "WARM_WORK_S", seconds)
+        monkeypatch.setattr(drive_route, "REHEARSED_S", seconds)
         out = tmp_path / f"after-{seconds}.json"
         asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--out", str(out)]
         begin, end = placed(8.0, 6.0), placed(150.0, 190.0)
