@@ -151,13 +151,33 @@ def open_data_folder(path: Path | str) -> DataFolder:
     if MARK in names:
         _check_layout(folder)
     elif names:
-        raise StorageError(
-            f"{folder} is not empty and has no {MARK}, so it is not a data folder; "
-            "give an empty or a new folder."
-        )
+        raise _foreign(folder)
     else:
         write_json(folder / MARK, {"layout": LAYOUT})
     return DataFolder(folder)
+
+
+def data_folder_at(path: Path | str) -> DataFolder | None:
+    """The data folder at a path, or None where one could be made; nothing is written.
+
+    Raises StorageError if something else lies there.
+    """
+    folder = local_place(path).expanduser().absolute()
+    if fetch(folder / MARK).is_file():
+        return DataFolder(folder)
+    try:
+        is_foreign = folder.exists() and any(folder.iterdir())
+    except OSError as error:
+        raise _not_writable(folder, error) from None
+    if is_foreign:
+        raise _foreign(folder)
+    return None
+
+
+def _foreign(folder: Path) -> StorageError:
+    return StorageError(
+        f"{folder} is not empty and has no {MARK}, so it is not a data folder; give an empty or a new folder."
+    )
 
 
 @functools.lru_cache(maxsize=8)

@@ -145,7 +145,7 @@ def checked_name(name: str) -> str:
     """The name of a class or run. Raises StorageError if it cannot be a file's name everywhere."""
     if not NAME.fullmatch(name):
         raise StorageError(
-            f"{name[:100]!r} cannot name a class or run; use up to 100 letters, digits, '-' and '_', "
-            "beginning with a letter or digit."
+            f"{name[:100]!r} cannot name a class, a run or a library; use up to 100 letters, digits, '-' and "
+            "'_', beginning with a letter or digit."
         )
     return name

@@ -8,8 +8,7 @@ from typing import Final
 from dashboards.cells import CellTable
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
-from storage.places.data_folder import MARK, DataFolder
-from storage.places.mirror import fetch, local_place
+from storage.places.data_folder import DataFolder, data_folder_at
 from storage.tables.experiences import read_experiences
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.champions.new_experience import PendingRetraining, pending_retraining
@@ -34,13 +33,13 @@ def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
 
     Raises:
         RunError: the registry cannot be reached.
+        StorageError: what is at ``data`` is no data folder.
     """
-    path = local_place(data).expanduser().absolute()
-    if not fetch(path / MARK).is_file():
+    folder = data_folder_at(data)
+    if folder is None:
         return [
             f"{data} is not a data folder yet: the run {settings.run_name} would make the first champions."
         ]
-    folder = DataFolder(path)
     pending = pending_retraining(folder, settings, Registry(folder))
     said: list[str | CellTable] = []
     first_run = pending.first_run

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from planners.world.classes.problem_classes import CLASSES
 from planners.world.vehicles.vehicle import VEHICLES
 from storage.errors import StorageError
-from storage.places.data_folder import MARK, DataFolder
+from storage.places.data_folder import MARK, DataFolder, data_folder_at
 from storage.places.mirror import fetch, local_place
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import read_gained, snapshot_ids
@@ -153,8 +153,10 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
 
 
 def _counts(version: Version, champion: Version | None) -> bool:
-    """Whether what a version was made of is not new: it was judged, or, without a champion, refused."""
-    return version.tag("verdict") == REFUSED if champion is None else is_judged(version, champion)
+    """Whether what a version was made of is not new: it was judged, or refused as the first one."""
+    if champion is not None:
+        return is_judged(version, champion)
+    return version.tag("verdict") == REFUSED and not version.tag("against")
 
 
 def check_there_is_something(data: Path, asked: LibraryRetraining) -> None:
@@ -173,13 +175,13 @@ def library_dry_run(data: Path, asked: LibraryRetraining) -> str:
 
     Raises:
         RunError: the registry cannot be reached.
+        StorageError: what is at ``data`` is no data folder.
         UsageError: there is nothing to gather from.
     """
     check_there_is_something(data, asked)
-    path = local_place(data).expanduser().absolute()
-    if not fetch(path / MARK).is_file():
+    folder = data_folder_at(data)
+    if folder is None:
         return f"{data} is not a data folder yet: the first library {asked.name} would be gathered in it."
-    folder = DataFolder(path)
     pending = pending_library(folder, asked, Registry(folder))
     return f"{pending.line}: {'a library would be gathered' if pending.is_due else 'nothing would be done'}"
 

@@ -21,6 +21,7 @@ from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
 from planners.world.vehicles.vehicle import CAR
 from storage.archives.libraries import load_library
+from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
 from storage.tables.attempts import read_attempts
 from storage.worlds.importing import ImportSettings
@@ -165,6 +166,9 @@ def test_a_library_that_is_no_better_is_refused_and_not_judged_again(
     for asked in (ASKED, more):
         assert task.retrain_library(data, asked) is None
         assert "version 1, version 2 was refused; nothing new was learned" in library_dry_run(data, asked)
+    with Registry(open_data_folder(data))._client() as client:
+        client.delete_registered_model_alias(ASKED.registered, "champion")  # by hand
+    assert "would be gathered" in library_dry_run(data, ASKED)  # version 2 was refused for a better one
 
 
 def test_a_first_library_that_makes_robots_later_is_no_champion(
@@ -180,6 +184,17 @@ def test_a_first_library_that_makes_robots_later_is_no_champion(
     _learn(data, 5, 8)
     second = _retrain(data)
     assert (second.verdict, _champion(data)) == (FIRST, 2)
+
+
+def test_a_dry_run_refuses_what_the_command_refuses(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").touch()
+    for place in ("file", "full"):
+        for ask in (library_dry_run, task.retrain_library):
+            with pytest.raises(StorageError, match="data folder"):
+                ask(tmp_path / place, ASKED)
+    assert (tmp_path / "full" / "mine.txt").exists()
 
 
 @given(st.dictionaries(st.text("abc", min_size=1, max_size=2), st.integers(1, 50), min_size=1, max_size=6))
