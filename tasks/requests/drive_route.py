@@ -18,6 +18,7 @@ from planners.world.arrays import Pose
 from planners.world.compiling import working_clock
 from planners.world.problem import Plan
 from storage.exchange.plans import PlanRecord, write_plan
+from storage.places.data_folder import open_data_folder
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
@@ -75,6 +76,7 @@ def drive_route(
     Raises:
         UsageError: an option is malformed, start or goal cannot be used, or an output would be written over
             an input.
+        StorageError: ``learn`` is no data folder.
         PlanFaultError: the independent judge refuses the route.
     """
     check_plan_file(out)
@@ -97,6 +99,8 @@ def drive_route(
         tolerance_m = settings.tolerance_m / scale
         return Router(each, solver, assistant.vehicle, tolerance_m, assistant.settings.polished)
 
+    if learn is not None:
+        open_data_folder(learn)
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
     asked = (x / scale, y / scale, heading), stops, motion

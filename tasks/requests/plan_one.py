@@ -12,6 +12,7 @@ from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from storage.exchange.problems import read_problem
+from storage.places.data_folder import open_data_folder
 from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
@@ -63,10 +64,12 @@ def plan_one(
 
     Raises:
         UsageError: the name of an output has a wrong ending, or an output would be written over an input.
-        StorageError: the problem is malformed, or the file has no such problem.
+        StorageError: the problem is malformed, the file has no such problem, or ``learn`` is no data folder.
     """
     check_plan_outputs([file, *assistant.files], out, drawing)
     problem = read_problem(file, assistant.vehicle, pick)
+    if learn is not None:
+        open_data_folder(learn)
     with no_garbage_collection():
         assistant.warm_up(problem)
         with told_meanwhile("planning"):

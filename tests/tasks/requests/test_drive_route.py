@@ -116,6 +116,18 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert picture.stat().st_size > 10_000
 
 
+def test_where_nothing_can_be_learned_is_told_before_the_drive(
+    town: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(drive_route, "Router", None)
+    file = tmp_path / "file"
+    file.touch()
+    begin, end = placed(8.0, 6.0), placed(150.0, 190.0)
+    asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--learn", str(file)]
+    assert call([*asked, "--from", f"{begin[0]},{begin[1]},0.3", "--to", f"{end[0]},{end[1]}"]) == 1
+    assert "data folder" in capsys.readouterr().err
+
+
 def test_how_long_a_route_is_rehearsed_does_not_change_it(
     town: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
