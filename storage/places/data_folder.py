@@ -166,7 +166,7 @@ def data_folder_at(path: Path | str) -> DataFolder | None:
     if fetch(folder / MARK).is_file():
         return DataFolder(folder)
     try:
-        is_foreign = folder.exists() and any(folder.iterdir())
+        is_foreign = not is_empty(folder) if is_remote(path) else folder.exists() and any(folder.iterdir())
     except OSError as error:
         raise _not_writable(folder, error) from None
     if is_foreign:
@@ -176,7 +176,8 @@ def data_folder_at(path: Path | str) -> DataFolder | None:
 
 def _foreign(folder: Path) -> StorageError:
     return StorageError(
-        f"{folder} is not empty and has no {MARK}, so it is not a data folder; give an empty or a new folder."
+        f"{shown(folder)} is not empty and has no {MARK}, so it is not a data folder; give an empty or a "
+        "new folder."
     )
 
 
@@ -190,10 +191,7 @@ def _open_remote(folder: Path) -> DataFolder:
     if fetch(folder / MARK).exists():
         _check_layout(folder)
     elif not is_empty(folder):
-        raise StorageError(
-            f"{shown(folder)} is not empty and has no {MARK}, so it is not a data folder; "
-            "give another folder."
-        )
+        raise _foreign(folder)
     else:
         write_json(folder / MARK, {"layout": LAYOUT})
     return DataFolder(folder)

@@ -9,8 +9,7 @@ from typing import NamedTuple
 from planners.world.classes.problem_classes import CLASSES
 from planners.world.vehicles.vehicle import VEHICLES
 from storage.errors import StorageError
-from storage.places.data_folder import MARK, DataFolder, data_folder_at
-from storage.places.mirror import fetch, local_place
+from storage.places.data_folder import DataFolder, data_folder_at
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import read_gained, snapshot_ids
 from storage.vehicles.vehicle_files import label_of
@@ -135,7 +134,7 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
         raise UsageError(
             f"{asked.registered} is a library of {champion.tag('vehicle')}: give this one another name."
         )
-    judged = [each for each in registry.versions(asked.registered) if _counts(each, champion)]
+    judged = [each for each in registry.versions(asked.registered) if _was_judged(each, champion)]
     if not judged:
         if not asked.sources and not learned:
             raise _nothing_to_gather(asked.name)
@@ -152,7 +151,7 @@ def pending_library(folder: DataFolder, asked: LibraryRetraining, registry: Regi
     return PendingLibrary(champion, number, is_anew, new > 0 or recipe not in known, line)
 
 
-def _counts(version: Version, champion: Version | None) -> bool:
+def _was_judged(version: Version, champion: Version | None) -> bool:
     """Whether what a version was made of is not new: it was judged, or refused as the first one."""
     if champion is not None:
         return is_judged(version, champion)
@@ -160,9 +159,11 @@ def _counts(version: Version, champion: Version | None) -> bool:
 
 
 def check_there_is_something(data: Path, asked: LibraryRetraining) -> None:
-    """Raise UsageError if there are no sources, and no data folder that may hold what was learned."""
-    path = local_place(data).expanduser().absolute()
-    if not asked.sources and not fetch(path / MARK).is_file():
+    """Raise UsageError if there are no sources, and no data folder that may hold what was learned.
+
+    Raises StorageError if there are none, and something else lies where the data folder would be.
+    """
+    if not asked.sources and data_folder_at(data) is None:
         raise _nothing_to_gather(asked.name)
 
 

@@ -17,7 +17,7 @@ from planners.world.vehicles.vehicle import CAR
 from storage.archives.archive import read_archive, write_archive
 from storage.errors import StorageError, UnreachableError
 from storage.places import objects
-from storage.places.data_folder import MARK, open_data_folder, open_run
+from storage.places.data_folder import MARK, data_folder_at, open_data_folder, open_run
 from storage.places.files import read_json, read_text, whole_file, write_json
 from storage.places.mirror import (
     fetch,
@@ -262,3 +262,15 @@ def test_a_memory_is_fetched_by_its_own_name_or_by_its_runs(storage: Any, tmp_pa
         with pytest.raises(StorageError, match="s3://bucket/team/data/runs/second holds nothing"):
             folders_here(f"{DATA}/runs/second", "memories")
     assert folders_here(str(tmp_path), "memories") == tmp_path
+
+
+def test_looking_for_a_data_folder_writes_nothing_and_names_what_else_is_there(
+    storage: Any, here: Path
+) -> None:
+    assert data_folder_at(DATA) is None
+    assert storage.list_objects_v2(Bucket=BUCKET)["KeyCount"] == 0
+    write_json(local_place(DATA) / "notes.json", {})
+    with pytest.raises(StorageError, match=f"{DATA} is not empty"):
+        data_folder_at(DATA)
+    remove(local_place(DATA) / "notes.json")
+    assert open_data_folder(DATA) == data_folder_at(DATA)
