@@ -131,7 +131,7 @@ class MapRouter:
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
         driven = scaled(in_frame_of(self._world, plan, scale), scale)
-        found = tuple((*each, self._vehicle) for each in route.news(scale))
+        found = tuple((*each, self._vehicle) for each in route.new_attempts(scale))
         return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds, found)
 
 

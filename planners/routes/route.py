@@ -40,7 +40,7 @@ class Route:
         """Where it comes from: "searched" if any leg was, else "repaired" if any was, else "recalled"."""
         return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
 
-    def news(self, scale: float) -> list[tuple[Problem, Attempt]]:
+    def new_attempts(self, scale: float) -> list[tuple[Problem, Attempt]]:
         """Each local problem whose plan no memory had, once and without a name, and how it was solved.
 
         Args:

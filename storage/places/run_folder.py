@@ -142,7 +142,7 @@ def worlds_name(path: Path) -> str:
 
 
 def checked_name(name: str) -> str:
-    """The name of a class or run. Raises StorageError if it cannot be a file's name everywhere."""
+    """The name of a class, run or library. Raises StorageError if it cannot be a file's name everywhere."""
     if not NAME.fullmatch(name):
         raise StorageError(
             f"{name[:100]!r} cannot name a class, a run or a library; use up to 100 letters, digits, '-' and "

@@ -196,8 +196,10 @@ def _registered(
 
 def _verdict(judgement: LibraryJudgement | None, approve: bool) -> str:
     """What becomes of a library: the first must do no harm, others have to be better than the champion."""
-    if judgement is None or judgement.champion is not None:
-        return verdict_on(judgement and judgement.champion, approve)
+    if judgement is None:
+        return FIRST
+    if judgement.champion is not None:
+        return verdict_on(judgement.champion, approve)
     does_harm = judgement.alone.problems >= FEWEST and judgement.alone.high_s < 0.0
     return REFUSED if does_harm else FIRST
 

@@ -126,7 +126,7 @@ def drive_route(
         write_plan(out, record)
     learned = 0
     if learn is not None:
-        learned = remember(learn, [Solved(*each) for each in route.news(scale)], assistant.vehicle)
+        learned = remember(learn, [Solved(*each) for each in route.new_attempts(scale)], assistant.vehicle)
     summary = route_summary(route, plan, stops, assistant, scale, solver.seconds, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late, as above

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 EXPERIMENT: Final = "motion-memory"
 RUN_TAG: Final = "motion_memory.run"  # the name of the run's folder
 STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
-WHOLE: Final = ("run", "gather")  # stages that are no part of a run, which has the name of what it makes
+WHOLE: Final = ("run", "gather")  # stages that MLflow lists by the name of the run or library they make
 KEY_TAG: Final = "motion_memory.key"  # digest of what the logged content depends on
 MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was logged with its encoder
 MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
