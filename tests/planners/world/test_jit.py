@@ -15,9 +15,11 @@ import pytest
 from numba import TypingError, types
 from numba.core.compiler import Flags
 
-import planners.world.jit
+from planners.world import kernel_files
 from planners.world.compiling import working_clock
-from planners.world.jit import KEPT_BESIDE, KernelFiles, _Flags, forget_old_kernels, jit
+from planners.world.jit import jit
+from planners.world.kernel_compilers import _Flags
+from planners.world.kernel_files import KEPT_BESIDE, KernelFiles, forget_old_kernels
 
 OTHERS = """
 import numba, numpy as np
@@ -113,11 +115,11 @@ def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(t
 IMPORTED = """
 import importlib, sys
 from pathlib import Path
-from planners.world.jit import _SOURCES, _sources_of_kernels
+from planners.world.kernel_files import SOURCES, sources_of_kernels
 
-files = _sources_of_kernels()
+files = sources_of_kernels()
 for path in list(files):
-    importlib.import_module(".".join(path.relative_to(_SOURCES.parent).with_suffix("").parts))
+    importlib.import_module(".".join(path.relative_to(SOURCES.parent).with_suffix("").parts))
 loaded = {Path(module.__file__) for name, module in list(sys.modules.items()) if name.startswith("planners.")}
 missing = {path for path in loaded if path.name != "__init__.py"} - set(files)
 assert not missing, missing
@@ -142,8 +144,8 @@ def test_kernels_that_were_moved_with_their_folder_are_not_compiled_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def loaded(sources: Path) -> int:
-        monkeypatch.setattr(planners.world.jit, "_SOURCES", sources)
-        monkeypatch.setattr(planners.world.jit, "_CACHE", sources / "kernels")
+        monkeypatch.setattr(kernel_files, "SOURCES", sources)
+        monkeypatch.setattr(kernel_files, "CACHE", sources / "kernels")
         doubled: Any = runpy.run_path(str(sources / "doubling.py"))["doubled"]
         assert doubled(3.0) == 6.0
         return sum(doubled.stats.cache_hits.values())
@@ -173,7 +175,7 @@ def test_the_working_clock_does_not_count_compiling(tmp_path: Path, monkeypatch:
     def tripled(value: float) -> float:
         return 3.0 * value
 
-    monkeypatch.setattr("planners.world.jit._CACHE", tmp_path)  # where it is not yet
+    monkeypatch.setattr("planners.world.kernel_files.CACHE", tmp_path)  # where it is not yet
     working, began = working_clock(), time.perf_counter()
     assert jit(tripled)(2.0) == 6.0
     ended = time.perf_counter()
@@ -183,7 +185,7 @@ def test_the_working_clock_does_not_count_compiling(tmp_path: Path, monkeypatch:
 def test_all_whole_numbers_are_one_kind_to_a_kernel_that_others_call(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("planners.world.jit._CACHE", tmp_path)
+    monkeypatch.setattr("planners.world.kernel_files.CACHE", tmp_path)
 
     @jit
     def doubled(number: Any) -> Any:

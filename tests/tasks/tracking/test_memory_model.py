@@ -25,7 +25,7 @@ from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
-from planners.world.jit import _CACHE
+from planners.world.kernel_files import CACHE
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.archives.libraries import save_library
@@ -212,7 +212,7 @@ def _installed(logged: dict[str, str], folder: Path) -> Path:
     assert f"code/{wheel.name}" in requirements.read_text().splitlines()
     with zipfile.ZipFile(wheel) as opened:
         opened.extractall(folder)
-    shutil.copytree(_CACHE, folder / "planners" / "__pycache__" / _CACHE.name)
+    shutil.copytree(CACHE, folder / "planners" / "__pycache__" / CACHE.name)
     return folder
 
 
