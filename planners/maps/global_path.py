@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy import ndimage, sparse
-from scipy.sparse import csgraph
+from scipy import ndimage
 
+from planners.maps.grid_dijkstra import OCCUPIED, distances_to
 from planners.maps.occupancy_map import OccupancyMap, blocks
 from planners.world.arrays import Floats, Integers
 from planners.world.problem import CANONICAL_DISTANCE
@@ -19,7 +19,6 @@ OFF_MIDDLE: Final = math.sqrt(0.5) - 0.5  # cells: no disc has so much more room
 MIN_CLEAR: Final = (
     0.5  # cells, between occupied ones, of which the middle has 0, and free ones, with 1 or more
 )
-_STEPS: Final = ((0, 1), (1, 0), (1, 1), (1, -1))  # row, column; the other four go backwards
 
 
 class GlobalPaths:
@@ -47,18 +46,10 @@ class GlobalPaths:
         return self.grid.resolution * clear_cells(self.grid)
 
     @cached_property
-    def _edges(self) -> sparse.csr_array:
-        free = np.pad(~self.grid.occupied, 1)
-        cells, rooms = np.arange(free.size).reshape(free.shape), np.pad(self.rooms, 1)
-        ends, lengths = [], []
-        for row, column in _STEPS:
-            to = np.roll(cells, (-row, -column), (0, 1))
-            beside = np.roll(free, -row, 0) & np.roll(free, -column, 1)
-            good = free & free.reshape(-1)[to] & beside & (rooms == rooms.reshape(-1)[to])
-            ends.append(np.stack([cells[good], to[good]]))
-            lengths.append(np.full(int(good.sum()), math.hypot(row, column)))
-        tails, heads = np.concatenate(ends, axis=1)
-        return sparse.csr_array((np.concatenate(lengths), (tails, heads)), shape=(free.size, free.size))
+    def _parts(self) -> Integers:
+        """The room of each free cell, with a border of one cell."""
+        parts: Integers = np.where(self.grid.occupied, OCCUPIED, self.rooms)
+        return np.pad(parts, 1, constant_values=OCCUPIED)
 
     def path(self, start: Floats, goal: Floats) -> Floats | None:
         """Return the spots ``[n, 2]`` (grid metres) of the cells on a shortest path, or None."""
@@ -67,10 +58,8 @@ class GlobalPaths:
     def paths_to(self, goal: Floats) -> PathsTo:
         """Find the shortest paths from everywhere to the cell of a goal ``[2]`` (grid metres)."""
         cell = _cell(self.grid, goal)
-        metres, after = csgraph.dijkstra(
-            self._edges, directed=False, indices=np.array(cell), return_predecessors=True
-        )
-        return PathsTo(self, cell, self.grid.resolution * metres, after)
+        cells, after = distances_to(cell, self._parts)
+        return PathsTo(self, cell, self.grid.resolution * cells, after)
 
 
 def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
@@ -121,9 +110,12 @@ class PathsTo:
         cells = [first]
         while cells[-1] != self._last:
             cells.append(int(self._after[cells[-1]]))
-        rows, columns = np.divmod(np.array(cells), self._grid.occupied.shape[1] + 2)
-        beyond = np.pad(self._spots, ((1, 1), (1, 1), (0, 0)), mode="edge")
-        spots: Floats = beyond[rows, columns]
+        bordered = np.divmod(np.array(cells), self._grid.occupied.shape[1] + 2)
+        rows, columns = (  # of the border, those of the cells beside it
+            np.clip(each - 1, 0, count - 1)
+            for each, count in zip(bordered, self._grid.occupied.shape, strict=True)
+        )
+        spots: Floats = self._spots[rows, columns]
         return spots
 
 
@@ -146,6 +138,7 @@ def local_goal(path: Floats, start: Floats, scale: float) -> float | None:
 
 
 def _cell(grid: OccupancyMap, point: Floats) -> int:
-    """The number of a point's cell, counting a border of one around the grid."""
+    """The number of a point's cell, counting a border of one around the grid, to which all beyond belongs."""
+    rows, columns = grid.occupied.shape
     column, row = np.floor(np.asarray(point) / grid.resolution)
-    return int(row + 1) * (grid.occupied.shape[1] + 2) + int(column + 1)
+    return int(np.clip(row, -1, rows) + 1) * (columns + 2) + int(np.clip(column, -1, columns) + 1)
