@@ -28,6 +28,7 @@ NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
 NEAREST: Final = 10  # of them: the cheapest of these sets what is usual
 LOOK: Final = 3  # every so many states a moved drive is looked at
+HOPELESS: Final = 0.4  # of its states are blocked: hardly any such drive becomes a plan
 SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
 
 
@@ -124,6 +125,8 @@ def rank_drives(
 ) -> tuple[int, int, int]:
     """Find the drives that promise most: quick ones that begin much as asked, and are hardly blocked.
 
+    Those of which more than ``HOPELESS`` is blocked are left out.
+
     Args:
         drives: of the vehicle.
         start: the state ``[S]`` at which the question begins.
@@ -164,7 +167,8 @@ def rank_drives(
             far[at] = away
             near[at] = -1 - drive if mirrored else drive
             count = min(count + 1, NEAR)
-    promises = np.empty(NEAR)
+    promises = np.full(NEAR, math.inf)
+    hopeful = 0
     for n in range(count):
         drive = max(near[n], -1 - near[n])
         side = 1.0 if near[n] >= 0 else -1.0
@@ -180,11 +184,13 @@ def rank_drives(
         steps = drives.costs[drive]
         if n == 0 or (n < NEAREST and steps < cheapest):
             cheapest = steps
-        promises[n] = (steps + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
+        if blocked <= HOPELESS * (last - begin):
+            promises[n] = (steps + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
+            hopeful += 1
     if count < NEAREST:
         cheapest = 0  # a few drives say nothing about what is usual
     best = np.argsort(promises[:count])
-    count = min(count, TRIED)
+    count = min(hopeful, TRIED)
     for n in range(count):
         order[n] = near[best[n]]
     return count, cheapest, checks

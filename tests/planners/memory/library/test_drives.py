@@ -10,16 +10,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.drive_answers import FAR
-from planners.memory.library.drives import NEAREST, TRIED, drives_of, moved_drive, rank_drives
+from planners.memory.library.drives import (
+    HOPELESS,
+    LOOK,
+    NEAREST,
+    TRIED,
+    drives_of,
+    moved_drive,
+    rank_drives,
+)
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.plan_arrays import store_plans
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import scene_of
+from planners.world.geometry.collision import blocked_states, scene_of
 from planners.world.goal import goal_of_pose
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle, state_size
-from tests.worlds import problem_of
+from tests.worlds import box, problem_of
 
 poses = st.tuples(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0), st.floats(-3.1, 3.1))
 vehicles = st.sampled_from([CAR, CAR_1_TRAILER])
@@ -108,6 +116,28 @@ def test_only_drives_that_begin_near_are_ranked(seed: int, vehicle: Vehicle) -> 
     assert len(set(order[:count].tolist())) == count == min(len(near), TRIED)
     usual = min(steps for _, steps, _ in near[:NEAREST]) if len(near) >= NEAREST else 0
     assert quickest == usual
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), vehicle=vehicles)
+def test_drives_that_are_mostly_blocked_are_left_out(seed: int, vehicle: Vehicle) -> None:
+    plans = [drive(seed + number, vehicle) for number in range(8)]
+    drives = drives_of(store_plans(plans, state_size(vehicle)), vehicle)
+    rng = np.random.default_rng(seed)
+    posts = [box(x, y, 0.0, 0.5, 0.5) for x, y in rng.uniform(10.0, 40.0, (40, 2))]
+    scene, order = scene_of(problem_of(posts)), np.zeros(TRIED, np.int32)
+    start = np.zeros(state_size(vehicle))
+    start[:3] = 25.0, 25.0, rng.uniform(-3.0, 3.0)
+    goal = goal_of_pose(*(start[:2] + rng.uniform(-3.0, 3.0, 2)), rng.uniform(-3.0, 3.0))
+    count, _, _ = rank_drives(drives, start, goal, math.inf, order, vehicle, scene)
+    hopeful = 0
+    for entry in range(-len(plans), len(plans)):
+        states = moved_drive(drives, entry, start, goal, vehicle.dt).states
+        blocked = LOOK * blocked_states(states[::LOOK], vehicle, scene).sum()
+        is_hopeful = blocked <= HOPELESS * len(states)
+        assert is_hopeful or entry not in order[:count]
+        hopeful += is_hopeful
+    assert count == min(hopeful, TRIED)
 
 
 def test_drives_that_do_not_end_at_rest_are_left_out() -> None:
