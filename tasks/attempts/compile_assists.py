@@ -8,7 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from planners.drive_answers import first_question
 from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
@@ -20,6 +22,9 @@ from planners.world.problem import (
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
+    POSE_RADIUS,
+    POSE_TOLERANCE,
+    Arrival,
     Problem,
     obstacles_of,
 )
@@ -46,6 +51,29 @@ def compile_free_answer(problem: Problem, attempt: Callable[[Problem], object], 
     attempt(empty)
     bits = View(empty, workspace).bits
     grid_metres(bits, empty.start[:2], empty.goal, empty.goal_radius, workspace)
+
+
+def library_questions(library: PlanLibrary, scale: float) -> list[Problem]:
+    """Questions that need all code and every index of a library, whatever others will ask.
+
+    Args:
+        library: of any vehicle.
+        scale: of the questions.
+
+    Returns:
+        One that a whole drive answers, if there is any, and a place and a pose behind a wall, which no drive
+        and no single part of a plan does.
+    """
+    x, y = CANONICAL_GOAL
+    wall = np.array([[0.4 * x, 0.5 * y], [0.5 * x, 0.4 * y], [0.6 * x, 0.5 * y], [0.5 * x, 0.6 * y]])
+    behind = replace(EMPTY, obstacles=obstacles_of([[wall]]), scale=scale)
+    arrival = Arrival(CANONICAL_START[2], POSE_TOLERANCE, 0.0, 0.0)
+    first = first_question(library, scale)
+    return [
+        *([] if first is None else [first]),
+        behind,
+        replace(behind, goal_radius=POSE_RADIUS, arrival=arrival),
+    ]
 
 
 def compile_assists(

@@ -28,6 +28,7 @@ from storage.archives.libraries import load_library
 from storage.tables.attempts import join_attempts, read_attempts, write_attempts
 from storage.tables.shards import shard_is_done
 from tasks.attempts.attempt_rows import attempt_row
+from tasks.attempts.compile_assists import library_questions
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.side_by_side import in_turn
 from tasks.fan_out.keys import key_of
@@ -214,6 +215,9 @@ def judge_piece(piece: JudgedPiece) -> None:
     kinds = {_is_pose(question): question for question in questions}
     for question, number in product(kinds.values(), range(len(sides))):
         attempt(question, number)  # anything made on first use exists before time counts
+    for number, (_, library) in enumerate(sides):
+        for question in [] if library is None else library_questions(library, questions[0].scale):
+            attempt(question, number)
     attempts = in_turn(questions, len(sides), seed, attempt)
     rows = []
     for number, question in enumerate(questions):

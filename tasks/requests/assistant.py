@@ -22,7 +22,7 @@ from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
-from tasks.attempts.compile_assists import EMPTY, compile_free_answer
+from tasks.attempts.compile_assists import EMPTY, compile_free_answer, library_questions
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
@@ -126,6 +126,9 @@ class Assistant:
             if others:
                 x, y, heading = other.start
                 self.attempt(replace(other, start=(x, y, heading + 1.0)))
+        if isinstance(memory, PlanLibrary) and others:
+            for question in library_questions(memory, problem.scale):
+                self.attempt(question, limits=limits)
         if self.settings.improve_seconds > 0.0:
             work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
             improve(

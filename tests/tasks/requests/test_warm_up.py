@@ -14,8 +14,13 @@ import gc, json, os, sys
 from dataclasses import replace
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
+from planners.memory.library.plan_library import gathered_library
 from planners.search.anytime import improve
+from planners.solve import solve
 from planners.world.alignment import to_canonical
+from planners.world.classes.families import family
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.libraries import save_library
 from tasks.requests.assistant import Assistant, AssistantSettings
 from tests.tasks.served import problem, write_memory
 from tests.worlds import box, problem_of
@@ -41,6 +46,22 @@ def with_memory():
         assistant(problem(index))
     yield loaded()
 
+def with_library():
+    def drawn(name, seed, count):
+        return [family(name, "standard", CAR).draw(seed, index) for index in range(count)]
+
+    slots = [to_canonical(each)[0] for each in drawn("perpendicular", 5, 6)]
+    plans = [(each.id, solve(each, "lattice").plan) for each in slots]
+    folder = Path(sys.argv[1]).with_name("library")
+    save_library(folder, gathered_library("perpendicular", CAR, plans), {})
+    assistant = Assistant(AssistantSettings("lattice", "open", 1, str(folder), 1))
+    assistant.warm_up(drawn("perpendicular", 5, 1)[0], others=True)  # a stored drive leads there
+    others = [*drawn("perpendicular", 6, 3), *drawn("parallel", 6, 3), problem(0)]
+    yield loaded()
+    for other in others:
+        assistant(other)
+    yield loaded()
+
 def not_driven():
     assistant = Assistant(AssistantSettings("lattice", "none", 1, None, 1))
     there = problem(0)
@@ -50,7 +71,7 @@ def not_driven():
         assistant(problem(index))
     yield loaded()
 
-for case in (improved, with_memory, not_driven):
+for case in (improved, with_memory, with_library, not_driven):
     if os.fork() == 0:  # each begins with what is imported, and nothing loaded
         before, after = case()
         late = sorted(name for name, _ in after - before)
@@ -86,6 +107,12 @@ def test_all_that_a_stored_plan_needs_is_warm_even_if_none_was_free_before(
     late: dict[str, list[str]],
 ) -> None:
     assert late["with_memory"] == []
+
+
+def test_all_that_a_library_needs_is_warm_even_if_a_stored_drive_answered_the_first_question(
+    late: dict[str, list[str]],
+) -> None:
+    assert late["with_library"] == []
 
 
 def test_all_that_improves_a_plan_is_warm_before_the_first_one(late: dict[str, list[str]]) -> None:
