@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from time import perf_counter
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.world.alignment import scaled
 from planners.world.arrays import Point, Pose
+from planners.world.compiling import working_clock
 from planners.world.vehicles.vehicle import Vehicle
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
@@ -121,9 +121,9 @@ class MapRouter:
         x, y, heading = self._world.grid_pose(x, y, heading)
         check_time_limit(time_limit, "time_limit")
         self._solver.seconds.clear()
-        began = perf_counter()
+        began = working_clock()
         route = self._router.route((x / scale, y / scale, heading), stops, motion, time_limit)
-        seconds = perf_counter() - began
+        seconds = working_clock() - began
         if isinstance(route, Stuck):
             why = route.told(self._world, scale)
             return RouteAnswer("stuck", None, None, why, len(self._solver.seconds), seconds)

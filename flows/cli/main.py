@@ -152,6 +152,8 @@ def _one_line(error: Exception) -> str:
             f"too many arguments: {' '.join(error.unused_tokens or ())}; leave them out, or write their "
             "option before each, as in --worlds A --worlds B."
         )
+    elif isinstance(error, OSError) and error.strerror and error.filename is not None:
+        text = f"{error.filename} cannot be used: {error.strerror}; check the path and who may use it."
     else:
         text = " ".join(str(error).split())
     return redacted(text) or type(error).__name__

@@ -23,6 +23,25 @@ COMMANDS = (
 )  # fmt: skip
 
 
+def test_a_folder_of_somebody_else_is_named_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    theirs, is_file = tmp_path / "theirs", Path.is_file
+
+    def refused(path: Path) -> bool:
+        if path.is_relative_to(theirs):
+            raise PermissionError(13, "Permission denied", str(path))
+        return is_file(path)
+
+    theirs.mkdir()
+    monkeypatch.setattr(Path, "is_file", refused)  # the tests' user may be root, who may do anything
+    assert call(["gather", str(theirs), "--out", str(tmp_path / "library")]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert str(theirs) in said
+    assert "Errno" not in said
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
