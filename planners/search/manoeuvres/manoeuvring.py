@@ -13,6 +13,7 @@ from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.enclosure import is_closed
 from planners.search.manoeuvres.endings import no_endings
+from planners.search.manoeuvres.kept_drives import KeptDrives
 from planners.search.manoeuvres.levels import FINE, LEVELS, suited
 from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
@@ -31,7 +32,7 @@ from planners.search.manoeuvres.variants import (
     without_trailers,
     word_radius,
 )
-from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
+from planners.search.manoeuvres.ways import allocate_ways
 from planners.search.outcome import Other
 from planners.search.query import Endings, Query, after_prefix, prefix_of
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go, metres_to_go
@@ -40,7 +41,7 @@ from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING, LEAST_SPEED, MOST_SPEED, SLACK, X, Y
-from planners.world.problem import Plan, start_state
+from planners.world.problem import start_state
 from planners.world.vehicles.vehicle import state_size
 
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
@@ -110,9 +111,7 @@ class Manoeuvring:
         self._known = FromStart(start, go, *known, outward=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
-        forget_ways(self._drive.ways)
-        self._kept: list[Other | None] = [None] * KEPT
-        self._soon: list[Other] = []
+        self._found = KeptDrives(self._drive, self._before)
         self.meets = meets(start[0], vehicle)
         self._stands = vehicle.min_speed <= 0.0 and bool(vehicle.first_order or start[0, 3] == 0.0)
         self._longer = MEETING if self.meets else 1
@@ -155,7 +154,8 @@ class Manoeuvring:
         other = copy.copy(self)
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
         other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
-        other._kept, other._soon, other._may_loop, other._may_mend = [None] * KEPT, [], False, False
+        other._found = KeptDrives(other._drive, self._before)
+        other._may_loop = other._may_mend = False
         return other
 
     @property
@@ -188,7 +188,7 @@ class Manoeuvring:
         end = self.expansions + most
         while self._finds_drive(end):
             if add_to_tree(self._drive, tree, self._before.states, self._before.controls, self._vehicle):
-                self._keep()
+                self._found.add_found()
                 return True
         return False
 
@@ -209,13 +209,13 @@ class Manoeuvring:
         """
         last = self.expansions + within
         if not self.kept and self._finds_drive(min(self.expansions + for_one, last), until):
-            self._keep()
+            self._found.add_found()
         began = self.expansions
         while self._finds_drive(min(began + most, last), until):
-            self._keep()
-        self._soon = [other for other in self._kept if other is not None]
+            self._found.add_found()
+        self._found.hold()
         while self._finds_drive(min(began + self._worth(*longer), last), until):
-            self._keep()
+            self._found.add_found()
         if longer[0] > 0 and self._may_be_detour:
             self._search_from_start(min(self.expansions + FROM_START, last), until)
         return last - self.expansions
@@ -225,7 +225,7 @@ class Manoeuvring:
         """Whether all that was found takes long, and only the tree out of the goal has grown."""
         if self.meets or not self._stands or self._grows_both or not self.kept:
             return False
-        return bool(self._drive.ways.seconds.min() > DETOUR * self._least_s)
+        return self._found.least_seconds > DETOUR * self._least_s
 
     def _search_from_start(self, end: int, until: float) -> None:
         """Search once more, out of the start alone, and keep what is found.
@@ -238,7 +238,7 @@ class Manoeuvring:
         while self.expansions < end and (left := until - working_clock()) > 0.0:
             found, used = self._grow(min(end - self.expansions, _turns(left) * TURN), from_start=True)
             if found:
-                self._keep()
+                self._found.add_found()
             elif used == 0:
                 return
 
@@ -248,7 +248,7 @@ class Manoeuvring:
             return 0
         per = PER_SQUARE_SECOND_MEETING if self.meets else PER_SQUARE_SECOND
         per = PER_SQUARE_SECOND_MENDED if self._is_mended else per
-        seconds = float(self._drive.ways.seconds.min())
+        seconds = self._found.least_seconds
         return int(max(min(per * seconds * seconds, longest), least))
 
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
@@ -317,21 +317,8 @@ class Manoeuvring:
 
     @property
     def kept(self) -> list[Other]:
-        """The drives of different kinds that were found, the one first that is estimated quickest.
-
-        Then follow those that were found soon, and later gave way to others: estimates may be wrong.
-        """
-        seconds = self._drive.ways.seconds
-        kept = [other for k in np.argsort(seconds, kind="stable") if (other := self._kept[k]) is not None]
-        return kept + [other for other in self._soon if all(other is not each for each in kept)]
-
-    def _keep(self) -> None:
-        drive = self._drive
-        steps = int(drive.counts[0])
-        states = np.concatenate([self._before.states, drive.states[1 : steps + 1]])
-        controls = np.concatenate([self._before.controls, drive.controls[:steps]])
-        plan = Plan(states, controls, self._vehicle.dt)
-        self._kept[keep_last(drive.ways)] = Other(plan, self.joined)
+        """The drives of different kinds that were found, the one first that is estimated quickest."""
+        return self._found.quickest_first()
 
     def _least_seconds(self) -> float:
         """The time from the start to the goal if nothing is in the way, or only cells that are not free."""
@@ -400,4 +387,4 @@ class Manoeuvring:
     @property
     def joined(self) -> bool:
         """Whether the drive that was found ends with a known ending."""
-        return bool(self._drive.counts[2])
+        return self._found.joins_last
