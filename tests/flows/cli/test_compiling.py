@@ -13,7 +13,7 @@ import pytest
 
 from flows.cli.document import Document
 from flows.cli.terminal import notices_shown, telling, write_document
-from planners.world import compiling, jit
+from planners.world import compiling, kernel_files
 
 KERNELS = """
 from planners.world.jit import jit
@@ -33,7 +33,7 @@ Told = Callable[..., tuple[str, str]]
 def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Told:
     """Says what is written to the output and the error stream while kernels are compiled."""
     (tmp_path / "kernels.py").write_text(KERNELS)
-    monkeypatch.setattr(jit, "_CACHE", tmp_path)
+    monkeypatch.setattr(kernel_files, "CACHE", tmp_path)
 
     def told(after_s: float, how: str = "", every_s: float = 1e9) -> tuple[str, str]:
         monkeypatch.setattr(compiling, "TOLD_AFTER", after_s)
