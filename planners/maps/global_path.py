@@ -48,7 +48,7 @@ class GlobalPaths:
     @cached_property
     def _parts(self) -> Integers:
         """The room of each free cell, with a border of one cell."""
-        parts: Integers = np.where(self.grid.occupied, OCCUPIED, self.rooms)
+        parts = np.where(self.grid.occupied, OCCUPIED, self.rooms).astype(np.int32)
         return np.pad(parts, 1, constant_values=OCCUPIED)
 
     def path(self, start: Floats, goal: Floats) -> Floats | None:

@@ -28,6 +28,7 @@ from planners.world.problem import (
     Problem,
     obstacles_of,
 )
+from planners.world.problem_faults import problem_fault
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
@@ -54,26 +55,23 @@ def compile_free_answer(problem: Problem, attempt: Callable[[Problem], object], 
 
 
 def library_questions(library: PlanLibrary, scale: float) -> list[Problem]:
-    """Questions that need all code and every index of a library, whatever others will ask.
+    """Questions that need most code and the indices of a library, whatever others will ask.
 
     Args:
         library: of any vehicle.
         scale: of the questions.
 
     Returns:
-        One that a whole drive answers, if there is any, and a place and a pose behind a wall, which no drive
-        and no single part of a plan does.
+        One that a whole drive answers, if there is any, and a place and a pose at rest behind a wall, which
+        hardly any drive or single part of a plan does; without the pose if the vehicle cannot stand.
     """
     x, y = CANONICAL_GOAL
     wall = np.array([[0.4 * x, 0.5 * y], [0.5 * x, 0.4 * y], [0.6 * x, 0.5 * y], [0.5 * x, 0.6 * y]])
     behind = replace(EMPTY, obstacles=obstacles_of([[wall]]), scale=scale)
     arrival = Arrival(CANONICAL_START[2], POSE_TOLERANCE, 0.0, 0.0)
     first = first_question(library, scale)
-    return [
-        *([] if first is None else [first]),
-        behind,
-        replace(behind, goal_radius=POSE_RADIUS, arrival=arrival),
-    ]
+    asked = [first, behind, replace(behind, goal_radius=POSE_RADIUS, arrival=arrival)]
+    return [each for each in asked if each is not None and not problem_fault(each, library.vehicle)]
 
 
 def compile_assists(

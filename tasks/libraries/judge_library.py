@@ -33,6 +33,7 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.side_by_side import in_turn
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
+from tasks.requests.assistant import WARM_WORK_S
 from tasks.requests.gather_pieces import GIVE_UP, GatherRequest, read_sources
 from tasks.requests.part_folder import NumberedPiece, do_here, remove_parts, unfinished
 from tasks.requests.question_sources import turn_of
@@ -215,9 +216,6 @@ def judge_piece(piece: JudgedPiece) -> None:
     kinds = {_is_pose(question): question for question in questions}
     for question, number in product(kinds.values(), range(len(sides))):
         attempt(question, number)  # anything made on first use exists before time counts
-    for number, (_, library) in enumerate(sides):
-        for question in [] if library is None else library_questions(library, questions[0].scale):
-            attempt(question, number)
     attempts = in_turn(questions, len(sides), seed, attempt)
     rows = []
     for number, question in enumerate(questions):
@@ -239,7 +237,12 @@ JUDGE_LIBRARY: Final = Job(
 
 @functools.lru_cache(maxsize=2)
 def _library(side: Side, vehicle: Vehicle) -> PlanLibrary:
-    return load_library(side.folder, vehicle)
+    """The library of a side, of which everything is made that is made on first use."""
+    library, workspace = load_library(side.folder, vehicle), Workspace()
+    for question in library_questions(library, library.scales[0]):
+        limits = usual_limits(question, WARM_WORK_S)
+        solve(question, PLANNER, ASSIST, TOP_K, library, limits=limits, vehicle=vehicle, workspace=workspace)
+    return library
 
 
 def questions_of(request: GatherRequest) -> Sequence[Problem]:

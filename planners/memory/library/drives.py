@@ -28,7 +28,7 @@ NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
 NEAREST: Final = 10  # of them: the cheapest of these sets what is usual
 LOOK: Final = 3  # every so many states a moved drive is looked at
-HOPELESS: Final = 0.4  # of its states are blocked: hardly any such drive becomes a plan
+HOPELESS: Final = 0.5  # of its states are blocked: hardly any such drive becomes a plan
 SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
 
 

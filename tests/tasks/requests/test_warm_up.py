@@ -56,6 +56,8 @@ def with_library():
     save_library(folder, gathered_library("perpendicular", CAR, plans), {})
     assistant = Assistant(AssistantSettings("lattice", "open", 1, str(folder), 1))
     assistant.warm_up(drawn("perpendicular", 5, 1)[0], others=True)  # a stored drive leads there
+    library = assistant.memory_of("perpendicular")
+    assert {"drives", "sub_plans", "stretches", "endings"} <= vars(library).keys()
     others = [*drawn("perpendicular", 6, 3), *drawn("parallel", 6, 3), problem(0)]
     yield loaded()
     for other in others:
