@@ -1,8 +1,8 @@
 """Dijkstra's search over the cells of a map: how far each is from one of them, and which comes next.
 
-Cells wait in buckets by whole metres of distance. No step is shorter than a bucket is wide, so the cells of
-the nearest bucket are settled in any order, and no heap is needed (Denardo and Fox, "Shortest-route methods:
-1. Reaching, pruning, and buckets", Operations Research 27(1), 1979).
+Cells wait in buckets by how many whole cells they are away. No step is shorter than a bucket is wide, so the
+cells of the nearest bucket are settled in any order, and no heap is needed (Denardo and Fox, "Shortest-route
+methods: 1. Reaching, pruning, and buckets", Operations Research 27(1), 1979).
 """
 
 from __future__ import annotations
