@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy import ndimage, sparse
@@ -13,6 +14,8 @@ from planners.maps.global_path import clear_cells
 from planners.maps.occupancy_map import OccupancyMap
 from planners.world.arrays import Flags, Floats, Point, Pose
 
+COARSE: Final = 0.25  # of the width of gaps that matter: wider cells are halved
+
 Cell = tuple[int, int]  # row, column
 
 
@@ -20,7 +23,7 @@ class Gap(NamedTuple):
     """A narrow place between two wider ones."""
 
     place: Point  # metres
-    width: float  # metres; at most, by up to a cell of the map
+    width: float  # metres; at most, by up to a cell
     onward: Point  # metres: where the way leads on, in the wider place behind
 
 
@@ -28,6 +31,7 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, most: float = 
     """Find what is narrowest on the widest way between two places.
 
     A way begins and ends where there is most room around: uphill from each place, away from what is occupied.
+    A gap of an odd number of cells would count as one wider, so coarse cells are halved.
 
     Args:
         world: the map.
@@ -38,6 +42,8 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, most: float = 
     Returns:
         The gap; None if there is no way, or nothing on it is narrower than its ends and than ``most``.
     """
+    if COARSE * most < world.resolution:
+        world = _halved(world)
     clear = clear_cells(world)
     here, there = (_roomiest(world, clear, place) for place in (start, goal))
     is_narrow = (clear > 0.0) & (clear < min(clear[here], clear[there]))
@@ -80,6 +86,12 @@ def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
         heading += math.pi
     middle = gap.place + 0.5 * (one + other)
     return float(middle[0]), float(middle[1]), heading
+
+
+def _halved(world: OccupancyMap) -> OccupancyMap:
+    """The same map in cells half as wide."""
+    halves = world.occupied.repeat(2, axis=0).repeat(2, axis=1)
+    return replace(world, occupied=halves, resolution=0.5 * world.resolution)
 
 
 def _saddle(clear: Floats, narrow: float, here: Cell, there: Cell) -> tuple[Cell, Cell]:

@@ -78,6 +78,19 @@ def test_doors_of_coarse_maps_are_never_told_too_narrow(resolution: float, cells
     assert resolution * cells <= gap.width + 1e-9 <= resolution * (cells + 1) + 1e-6
 
 
+@given(resolution=st.sampled_from([0.5, 1.0, 2.0]), cells=st.integers(1, 8))
+def test_the_width_of_doors_that_matter_is_told_exactly_on_coarse_maps(resolution: float, cells: int) -> None:
+    """A door of one cell counted as two cells wide, so no vehicle was led through it."""
+    occupied = np.zeros((30, 40), bool)
+    occupied[:, 20] = True
+    occupied[10 : 10 + cells, 20] = False
+    far = 39.9 * resolution, 29.9 * resolution
+    world = OccupancyMap("coarse", occupied, resolution)
+    gap = narrowest_gap(world, (0.0, 0.0), far, most=3.9 * resolution)
+    assert (gap is None) == (cells > 3)
+    assert gap is None or gap.width == pytest.approx(cells * resolution)
+
+
 def bottleneck(world: OccupancyMap, start: tuple[int, int], goal: tuple[int, int]) -> float:
     """The least clearance on the widest way between two cells, by a maximum spanning tree of SciPy."""
     clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]

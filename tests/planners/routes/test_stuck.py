@@ -65,7 +65,7 @@ def test_a_narrower_door_that_is_nearer_leads_nobody_astray() -> None:
 
 
 @pytest.mark.parametrize("vehicle", [CAR, CAR_1_TRAILER])
-@pytest.mark.parametrize("resolution", [0.2, 0.25, 0.5])
+@pytest.mark.parametrize("resolution", [0.2, 0.25, 0.5, 1.0])
 def test_a_door_hardly_wider_than_the_vehicle_is_driven_through(resolution: float, vehicle: Vehicle) -> None:
     """A search for places behind the door seldom finds the way."""
     occupied = np.zeros((round(20.0 / resolution), round(30.0 / resolution)), bool)
