@@ -11,8 +11,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planners.optimisation.polish import polish_quickest
+from planners.optimisation.polish import polish, polish_quickest
 from planners.search.anytime import asking_for_kinds, improve
+from planners.search.manoeuvres.forward_arrivals import arrive_forwards
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.variants import counting_time, slowed
 from planners.search.outcome import Outcome, Status
@@ -156,6 +157,10 @@ def _searched_and_polished(
         below_s=below_s,
     )
     best, rough = solved[number]
+    forwards = None if polished.plan is None else arrive_forwards(query, polished.plan, until)
+    if forwards is not None:
+        around = vehicle, query.scene, query.workspace
+        polished = polish(query.problem, forwards, *around, seconds=until - working_clock())
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
     plan, expected_s = polished.plan or rough, found[0].expected_s
     too_long_s = 0.0 if expected_s is None else plan.duration_s - expected_s
