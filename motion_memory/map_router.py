@@ -151,7 +151,9 @@ def _check_map(world: OccupancyMap) -> None:
         raise UsageError(f"The map's name is {short(world.name)}; give a text of printable characters.")
     occupied = world.occupied
     is_grid = isinstance(occupied, np.ndarray) and occupied.dtype == np.bool_ and occupied.ndim == 2
-    if not (is_grid and occupied.size):
+    if is_grid and not occupied.size:
+        raise UsageError(f"The map's occupied has no cells: its shape is {occupied.shape}.")
+    if not is_grid:
         raise UsageError(
             "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest."
         )

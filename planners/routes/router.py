@@ -100,27 +100,18 @@ class Router:
                 by then depends on the machine. None: no limit.
         """
         until = math.inf if time_limit is None else working_clock() + time_limit
-        begun = replace(self._whole, start=start, start_motion=motion)
-        problems = [
-            replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
-        ]
-        state = start_state(begun, self._vehicle)
-        if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
-            who = self._blocked_body(state)
-            return Stuck(start[:2], f"{who} would stand in an obstacle or outside the map", 0)
-        for stop, to_stop in zip(stops, problems, strict=True):
-            if not point_is_free(*stop.place, self._scene):
-                return Stuck(stop.place, "the goal lies in an obstacle or outside the map", 0)
-            if lacks_room(to_stop, self._vehicle, self._scene):
-                who = self._blocked_body(unfolded(to_stop, self._vehicle))
-                return Stuck(stop.place, f"{who} has no room in the goal pose", 0)
+        problems = self._problems(start, stops, motion)
+        refused = self.refusal(start, stops, motion)
+        if refused is not None:
+            return refused
+        state = self._state(start, motion)
         sections: list[list[Leg]] = []
         paths = []
         self._search.begin(until)
         for number, stop in enumerate(stops):
             ahead = PathAhead(self._paths, stop, self._scene, state)
             path = ahead.path(state)
-            goal = f"goal {number + 1}" if len(stops) > 1 else "the goal"
+            goal = _goal_name(number, stops)
             if path is None:
                 why = f"{goal} cannot be reached: no way that is wide enough leads there"
                 return self._at_a_gap(
@@ -145,6 +136,44 @@ class Router:
             paths.append(np.vstack((pose[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
+
+    def refusal(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Stuck | None:
+        """Why start or goals cannot be used, if so; arguments as of ``route``."""
+        state = self._state(start, motion)
+        if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
+            who = self._blocked_body(state)
+            where = "in an obstacle or across the map's edge" if self._holds(start[:2]) else "outside the map"
+            return Stuck(start[:2], f"{who} would stand {where}", 0)
+        for number, (stop, to_stop) in enumerate(
+            zip(stops, self._problems(start, stops, motion), strict=True)
+        ):
+            goal = _goal_name(number, stops)
+            if not point_is_free(*stop.place, self._scene):
+                where = "in an obstacle" if self._holds(stop.place) else "outside the map"
+                return Stuck(stop.place, f"{goal} lies {where}", 0)
+            if lacks_room(to_stop, self._vehicle, self._scene):
+                who = self._blocked_body(unfolded(to_stop, self._vehicle))
+                pose = f"the pose of {goal}" if len(stops) > 1 else "the goal pose"
+                return Stuck(stop.place, f"{who} has no room in {pose}", 0)
+        return None
+
+    def _holds(self, place: Point) -> bool:
+        """Whether a place lies in the map."""
+        return all(0.0 <= along <= size for along, size in zip(place, self._world.size, strict=True))
+
+    def _begun(self, start: Pose, motion: tuple[float, ...]) -> Problem:
+        return replace(self._whole, start=start, start_motion=motion)
+
+    def _state(self, start: Pose, motion: tuple[float, ...]) -> Floats:
+        """The state ``[S]`` at the start."""
+        return start_state(self._begun(start, motion), self._vehicle)
+
+    def _problems(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...]) -> list[Problem]:
+        """For each stop the problem of driving there from the start."""
+        begun = self._begun(start, motion)
+        return [
+            replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
+        ]
 
     def _roomy_paths(self) -> GlobalPaths:
         grid = self._paths.grid
@@ -251,6 +280,10 @@ class Router:
     def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
         """Where the widest way is narrowest, if the vehicle hardly fits through there."""
         return narrowest_gap(self._world, start, goal, NARROW * self._widest)
+
+
+def _goal_name(number: int, stops: Sequence[Stop]) -> str:
+    return f"goal {number + 1}" if len(stops) > 1 else "the goal"
 
 
 def _disc_inside(body: Vehicle | Trailer) -> float:

@@ -105,8 +105,9 @@ def drive_route(
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
     asked = (x / scale, y / scale, heading), stops, motion
     with told_meanwhile("planning"):
-        _drive_mirrored(router_over, canonical, *asked)
-        OtherWork()()
+        if router.refusal(*asked) is None:
+            _drive_mirrored(router_over, canonical, *asked)
+            OtherWork()()
         solver.seconds.clear()
         began = working_clock()
         route = router.route(*asked, request.time_limit)

@@ -252,6 +252,7 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "8,6,0", "--to", "150,190", "--start-hitch", "0.1"], 2, "has no trailer"),
         (["--from", "-8,6,0", "--to", "150,190"], 2, "outside the map, at (-8.00, 6.00)"),
         (["--from", "8,6,0", "--to", "150,1900"], 2, "outside the map, at (150.00, 1900.00)"),
+        (["--from", "8,6,0", "--to", "8,6", "--to", "150,1900"], 2, "goal 2 lies outside the map"),
         (["--from", "8,6,0", "--to", "150,190", "--scale", "0"], 2, "Scale is 0"),
         (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide; at scale 1"),
         (["--from", "8,6,0", "--to", "150,190", "--assist", "open"], 2, "needs --memory"),
