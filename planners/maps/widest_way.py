@@ -42,12 +42,12 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, most: float = 
     Returns:
         The gap; None if there is no way, or nothing on it is narrower than its ends and than ``most``.
     """
-    if COARSE * most < world.resolution:
-        world = _halved(world)
-    clear = clear_cells(world)
-    here, there = (_roomiest(world, clear, place) for place in (start, goal))
+    parts = 2 if COARSE * most < world.resolution else 1
+    finer = _divided(world, parts)
+    clear = clear_cells(finer)
+    here, there = (_roomiest(finer, clear, place) for place in (start, goal))
     is_narrow = (clear > 0.0) & (clear < min(clear[here], clear[there]))
-    levels = np.unique(clear[is_narrow & (clear <= 0.5 * most / world.resolution)])
+    levels = np.unique(clear[is_narrow & (clear <= 0.5 * most / finer.resolution)])
     if not len(levels) or _joins(clear > levels[-1], here, there):
         return None
     low, high = 0, len(levels)
@@ -57,8 +57,9 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, most: float = 
     if low == 0:
         return None
     narrow = float(levels[low - 1])
-    place, onward = (_middle(world, cell) for cell in _saddle(clear, narrow, here, there))
-    return Gap(place, 2.0 * world.resolution * narrow, onward)
+    cells = _saddle(clear, narrow, here, there)
+    place, onward = (_middle(world, (row // parts, column // parts)) for row, column in cells)
+    return Gap(place, 2.0 * finer.resolution * narrow, onward)
 
 
 def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
@@ -88,10 +89,10 @@ def middle_of(gap: Gap, world: OccupancyMap) -> Pose | None:
     return float(middle[0]), float(middle[1]), heading
 
 
-def _halved(world: OccupancyMap) -> OccupancyMap:
-    """The same map in cells half as wide."""
-    halves = world.occupied.repeat(2, axis=0).repeat(2, axis=1)
-    return replace(world, occupied=halves, resolution=0.5 * world.resolution)
+def _divided(world: OccupancyMap, parts: int) -> OccupancyMap:
+    """The same map, each side of its cells divided into so many parts."""
+    cells = world.occupied.repeat(parts, axis=0).repeat(parts, axis=1)
+    return replace(world, occupied=cells, resolution=world.resolution / parts)
 
 
 def _saddle(clear: Floats, narrow: float, here: Cell, there: Cell) -> tuple[Cell, Cell]:
