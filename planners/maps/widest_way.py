@@ -23,7 +23,7 @@ class Gap(NamedTuple):
     """A narrow place between two wider ones."""
 
     place: Point  # metres
-    width: float  # metres; at most, by up to a cell
+    width: float  # metres; at most, by up to a cell where cells are fine
     onward: Point  # metres: where the way leads on, in the wider place behind
 
 

@@ -40,6 +40,7 @@ RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and 
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
 POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
 BRIEFLY: Final = Limits(expansions=8_000)
+VERY_BRIEFLY: Final = Limits(expansions=3_000)  # into a door, where there mostly are others
 LATE: Final = "the limit of time ended the search where it was nearest to the goal"
 
 Solve = Callable[[Problem, Limits], Attempt]
@@ -79,15 +80,21 @@ class LegSearch:
         self.is_late = self.is_late or working_clock() >= self._until
         return self.is_late
 
-    def legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
-        """Search the legs from a state to rest at one stop, depth first."""
+    def legs_to(self, ahead: PathAhead, state: Floats, attempts: int = ATTEMPTS) -> list[Leg] | Stuck:
+        """Search the legs from a state to rest at one stop, depth first.
+
+        Args:
+            ahead: the paths to the stop.
+            state: ``[S]`` from which to drive.
+            attempts: local problems that may be tried, beside those for each metre of the way.
+        """
         legs: list[Leg] = []
         metres = float(ahead.to_go(state[np.newaxis])[0])
         if math.isinf(metres):
             return Stuck(ahead.stop.place, "no way that is wide enough leads to the goal", 0)
         options = [self._legs_from(ahead, state)]
         self._pose_tries, self._is_enclosed = 0, False
-        self._most_attempts = self.attempts + ATTEMPTS + int(ATTEMPTS_A_METRE * metres)
+        self._most_attempts = self.attempts + attempts + int(ATTEMPTS_A_METRE * metres)
         start = nearest = state
         while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
             leg = next(options[-1], None)
@@ -134,7 +141,8 @@ class LegSearch:
                 self._pose_tries += 1
             problem = self._problem(state, goal)
             self.attempts += 1
-            limits = BRIEFLY if goal.brief else usual_limits(problem)
+            briefly = VERY_BRIEFLY if ahead.briefly else BRIEFLY
+            limits = briefly if goal.brief else usual_limits(problem)
             left = max(self._until - working_clock(), 0.0)
             attempt = self._solve(problem, replace(limits, seconds=min(limits.seconds, left)))
             if attempt.plan is None:

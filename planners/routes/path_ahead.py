@@ -61,7 +61,7 @@ class PathAhead:
             start: ``[>= 2]`` from where the vehicle comes.
             briefly: whether a pose is never asked for as long as need be.
         """
-        self._briefly = briefly
+        self.briefly = briefly
         self.stop, self._scene, self._grid, self._spots = stop, scene, paths.grid, paths.spots
         self._cell_m = paths.grid.resolution
         self._room = np.pad(paths.room, 1)
@@ -158,14 +158,14 @@ class PathAhead:
             place, radius, arrival = self.stop
             if not self.stop.is_pose:
                 goals.append(LocalGoal(place, radius, None, True))
-            brief = self.stop.is_pose and (self._briefly or along[-1] > NEAR_M)
+            brief = self.stop.is_pose and (self.briefly or along[-1] > NEAR_M)
             goals.append(LocalGoal(place, radius, arrival, True, brief))
         for reach in REACHES_M:
             within = (along <= reach) & (along >= reach - SOUGHT_M) & (straight <= CANONICAL_DISTANCE)
             if reach < along[-1] and within.any():
                 x, y = path[int(np.where(within, along - TIGHT_M * lacking, -math.inf).argmax())].tolist()
                 goals.append(LocalGoal((x, y), GOAL_RADIUS, None, False))
-        if not self._briefly:  # where nothing nearer led on
+        if not self.briefly:  # where nothing nearer led on
             goals += [goal._replace(brief=False) for goal in goals if goal.brief]
         return goals
 

@@ -43,7 +43,10 @@ WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that ar
 DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
 ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
 OF_OUTLINE: Final = 0.9  # of its width: who does not fill a box may get through what is narrower
-DOORS: Final = 4  # one after another that a vehicle is led through by a pose in each
+DOORS: Final = 4  # one after another that a vehicle is led through by a pose in each, if it can be ...
+DOOR_POSES: Final = 8  # ... with so many poses in all; local problems that may be tried, ...
+ATTEMPTS_INTO: Final = 3  # ... beside those for each metre of the way, to get into one of them, ...
+ATTEMPTS_ONWARD: Final = 10  # ... and to drive on from there
 
 
 class Router:
@@ -68,6 +71,7 @@ class Router:
         """
         self._world, self._vehicle, self._polishes = world, vehicle, polishes
         self._workspace = Workspace()
+        self._poses_left = 0
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
         bounds = (0.0, 0.0, *world.size)
         occupied = self._surroundings.obstacles()
@@ -188,14 +192,15 @@ class Router:
             return stuck
         legs = None
         if stuck.to_go is not None and not self._search.time_is_up():
-            legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), DOORS)
+            self._poses_left = DOOR_POSES
+            legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), ())
         legs = legs or self._legs_around(path, ahead.stop, state)
         if legs is None and stuck.to_go is not None and self._search.is_late:
             return stuck._replace(why=LATE, is_late=True)
         return legs or stuck
 
     def _legs_through(
-        self, ahead: PathAhead, state: Floats, place: Point, doors: int
+        self, ahead: PathAhead, state: Floats, place: Point, doors: tuple[Point, ...]
     ) -> list[Leg] | Stuck | None:
         """Search the legs to a stop by way of a pose in the narrowest gap behind a place, and so on.
 
@@ -205,15 +210,15 @@ class Router:
             ahead: the paths to the stop.
             state: ``[S]`` from which to drive.
             place: there, or behind the door in which the vehicle stands.
-            doors: that it may be led through, one after another.
+            doors: through which it was led so far.
 
         Returns:
             The legs; None if there are none, or why it is hopeless.
         """
-        if doors == 0:
+        gap = self._narrow_gap(place, ahead.stop.place) if len(doors) < DOORS else None
+        if gap is None or gap.place in doors:
             return None
-        gap = self._narrow_gap(place, ahead.stop.place)
-        pose = None if gap is None else middle_of(gap, self._world)
+        pose = middle_of(gap, self._world)
         if pose is None:
             return None
         x, y, through = pose
@@ -223,22 +228,23 @@ class Router:
         straight = (0.0,) * len(trailers_of(self._vehicle))
         tolerances = (POSE_TOLERANCE,) * len(straight)
         for heading in (through, through + math.pi):
-            if self._search.time_is_up():
+            if self._search.time_is_up() or self._poses_left == 0:
                 break
             place = x - off * math.cos(heading), y - off * math.sin(heading)
             if not point_is_free(*place, self._scene):
                 continue
+            self._poses_left -= 1
             arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0, straight, tolerances)
             parked = Stop(place, POSE_RADIUS, arrival)
             into = self._search.legs_to(
-                PathAhead(self._paths, parked, self._scene, state, briefly=True), state
+                PathAhead(self._paths, parked, self._scene, state, briefly=True), state, ATTEMPTS_INTO
             )
             if isinstance(into, Stuck) or not into:
                 continue
             inside = into[-1].end
-            onward: list[Leg] | Stuck | None = self._search.legs_to(ahead, inside)
+            onward: list[Leg] | Stuck | None = self._search.legs_to(ahead, inside, ATTEMPTS_ONWARD)
             if isinstance(onward, Stuck) and not onward.is_enclosed:
-                onward = self._legs_through(ahead, inside, behind, doors - 1)
+                onward = self._legs_through(ahead, inside, behind, (*doors, gap.place))
             if onward is not None:
                 return onward if isinstance(onward, Stuck) else into + onward
         return None

@@ -157,10 +157,11 @@ def _searched_and_polished(
         below_s=below_s,
     )
     best, rough = solved[number]
-    forwards = None if polished.plan is None else arrive_forwards(query, polished.plan, until)
+    forwards = None if polished.plan is None else arrive_forwards(query, polished.plan, until, below_s)
     if forwards is not None:
         around = vehicle, query.scene, query.workspace
         polished = polish(query.problem, forwards, *around, seconds=until - working_clock())
+        best, rough = replace(best, joined=rough is given), forwards  # it begins as the other drive, no more
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
     plan, expected_s = polished.plan or rough, found[0].expected_s
     too_long_s = 0.0 if expected_s is None else plan.duration_s - expected_s

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -31,25 +31,18 @@ from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
 
 AT_LAST: Final = 0.25  # lengths of all trailers at the end of a drive: if they lead backwards, it backs in
-APART: Final = 0.5  # lengths of all trailers between states from which loops are laid
+APART: Final = 1.0  # lengths of all trailers between states from which loops are laid
 MOST_STATES: Final = 16  # of them, the last ones of the drive ...
 NEAR: Final = 3.0  # ... that are no farther from the goal, in lengths of the whole train
 RUN_IN: Final = 0.5  # lengths of all trailers: where so much straight ahead of the goal is blocked, none fits
 BLOCKED: Final = 3.0  # times its cost: so much more a loop is expected to cost if all of it is blocked
+LOOKED_AT: Final = 6  # loops that may cost least: what they cost is estimated more closely
 TRIES: Final = 3  # loops that are optimised
 ITERATIONS: Final = 60  # with so many iterations each
 GAIN: Final = 0.05  # share of its cost that a drive must be expected to save
 
 
-class _Way(NamedTuple):
-    """A drive up to one of its states, and a loop from there."""
-
-    states: Floats  # [T, S]
-    expected: float  # what it will cost
-    bends: tuple[float, ...]  # signs of those of the loop's arcs
-
-
-def arrive_forwards(query: Query, plan: Plan, until: float) -> Plan | None:
+def arrive_forwards(query: Query, plan: Plan, until: float, below_s: float = math.inf) -> Plan | None:
     """End a drive in a loop, if that costs less; None if it does not end backwards, or no loop does.
 
     A train that is quicker backwards mostly has quicker ways.
@@ -58,6 +51,7 @@ def arrive_forwards(query: Query, plan: Plan, until: float) -> Plan | None:
         query: the problem, and the buffers.
         plan: for the problem, polished.
         until: when to end, by ``working_clock``.
+        below_s: only a drive that costs less is wanted.
     """
     vehicle, goal = query.vehicle, goal_of(query.problem, query.vehicle)
     reverses = 0.0 < -vehicle.min_speed <= vehicle.max_speed
@@ -65,14 +59,15 @@ def arrive_forwards(query: Query, plan: Plan, until: float) -> Plan | None:
         return None
     end = pose_of(goal, state_size(vehicle))
     before = end.copy()
+    before[5:] = 0.0
     before[:2] -= RUN_IN * _train(vehicle) * np.array([math.cos(end[2]), math.sin(end[2])])
     if count_free_prefix(before[np.newaxis], vehicle, query.scene) == 0:
         return None
-    cost = cost_of(plan, vehicle)
+    cost = min(cost_of(plan, vehicle), below_s)
     drive = query.workspace.buffers(allocate_drive, state_size(vehicle))
     ways = _promising(query, plan, end, drive, (1.0 - GAIN) * cost, until)
     bounded = replace(query, limits=replace(query.limits, bound_s=cost))
-    if drive_one_of([way.states for way in ways], bounded, drive, vehicle, until, ITERATIONS) < 0:
+    if drive_one_of(ways, bounded, drive, vehicle, until, ITERATIONS) < 0:
         return None
     steps = int(drive.counts[0])
     better = Plan(drive.states[: steps + 1].copy(), drive.controls[:steps].copy(), vehicle.dt)
@@ -91,26 +86,33 @@ def _backs_in(plan: Plan, vehicle: Vehicle) -> bool:
     return bool((gears_of(plan, vehicle) * metres)[at_last].sum() < 0.0)
 
 
-def _promising(query: Query, plan: Plan, end: Floats, drive: Drive, below: float, until: float) -> list[_Way]:
-    """The ways into ``end [S]`` that are expected to cost least, each less than ``below``, one of a kind."""
-    vehicle, found = query.vehicle, []
+def _promising(
+    query: Query, plan: Plan, end: Floats, drive: Drive, below: float, until: float
+) -> list[Floats]:
+    """Ways ``[T, S]`` into ``end [S]`` of different kinds, each expected to cost less than ``below``."""
+    vehicle = query.vehicle
     loops = query.workspace.buffers(allocate_loops)
     around = word_radius(vehicle), _train(vehicle), vehicle
+    found: list[tuple[float, float, Floats, tuple[float, ...]]] = []
     for begins in _beginnings(plan, end, vehicle):
         if working_clock() >= until:
             break
-        start = plan.states[begins : begins + 1]
+        start = plan.states[begins : begins + 1].copy()
+        start[0, 3] = 0.0  # the gear may change
         list_loops(loops, start, end[np.newaxis], *around, query.scene)
         for k in np.flatnonzero(loops.blocked < 1.0).tolist():
-            rows = lay_loop(drive.states, loops, k, start, vehicle)
+            metres, longer = loops.metres[k], 1.0 + BLOCKED * loops.blocked[k]
+            seconds = np.where(metres > 0.0, metres / vehicle.max_speed, metres / vehicle.min_speed).sum()
+            least = longer * (begins * vehicle.dt + seconds)
+            rows = lay_loop(drive.states, loops, k, start, vehicle) if least < below else 0
             if rows > 1:
-                states = np.concatenate([plan.states[:begins], drive.states[:rows]])
-                expected = (1.0 + BLOCKED * loops.blocked[k]) * cost_of(retimed(states, vehicle), vehicle)
-                found.append(_Way(states, expected, tuple(np.sign(loops.bends[k]).tolist())))
-    of_kinds: dict[tuple[float, ...], _Way] = {}
-    for way in sorted(found, key=lambda way: way.expected):
-        if way.expected < below:
-            of_kinds.setdefault(way.bends, way)
+                way = np.concatenate([plan.states[:begins], drive.states[:rows]])
+                found.append((least, longer, way, tuple(np.sign(loops.bends[k]).tolist())))
+    found.sort(key=lambda each: each[0])
+    of_kinds: dict[tuple[float, ...], Floats] = {}
+    for _, longer, way, kind in found[:LOOKED_AT]:
+        if kind not in of_kinds and longer * cost_of(retimed(way, vehicle), vehicle) < below:
+            of_kinds[kind] = way
     return list(of_kinds.values())[:TRIES]
 
 

@@ -12,13 +12,15 @@ from planners.maps.global_path import passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.leg_search import LegSearch
+from planners.routes.legs import Leg
 from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
-from planners.routes.router import Router
+from planners.routes.router import DOOR_POSES, Router
 from planners.routes.stuck import Stuck
 from planners.search.outcome import Status
 from planners.search.query import Limits
 from planners.solve import solve
+from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Arrival, Problem, obstacles_of, start_state
@@ -163,3 +165,22 @@ def test_a_slot_that_nobody_gets_out_of_is_asked_for_once() -> None:
     stuck = kerb.route((8.0, 8.0, 0.0), [goal])
     assert isinstance(stuck, Stuck)
     assert (stuck.is_enclosed, stuck.attempts, stuck.place) == (True, 1, goal.place)
+
+
+def test_who_gets_into_doors_and_no_farther_soon_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In mazes of coarse cells it was tried for up to half a minute, in the same doors again and again."""
+    world = doors_at(*range(20, 180, 12), size=(60, 200))
+    tried = []
+    legs_to = LegSearch.legs_to
+
+    def only_into_doors(
+        search: LegSearch, ahead: PathAhead, state: Floats, attempts: int = 30
+    ) -> list[Leg] | Stuck:
+        legs = legs_to(search, ahead, state, attempts)
+        tried.append((ahead.briefly, ahead.stop.place))
+        return legs if ahead.briefly else Stuck(ahead.stop.place, "no", 1, 1.0)
+
+    monkeypatch.setattr(LegSearch, "legs_to", only_into_doors)
+    assert isinstance(Router(world, solves).route((2.0, 6.0, 0.0), [Stop((38.0, 6.0))]), Stuck)
+    into = [place for briefly, place in tried if briefly]
+    assert 0 < len(into) <= DOOR_POSES
