@@ -36,11 +36,12 @@ from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Floats
-from planners.world.driving_cost import gears_of
+from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
+_CUSP_LENGTHS: Final = 5.0  # of the vehicle: a last change of gear so near a goal is shown close up
 _APART: Final = 0.1  # of the longer side of what is shown: arrows along the drive
 _CLOSE_UP_ENTRIES: Final = [
     Patch(facecolor=INK, label="the vehicle where a close-up begins"),
@@ -141,7 +142,6 @@ def _arrivals(
     All is turned as the map's frame is, in canonical metres.
     """
     length = whole_length_m(vehicle)
-    reach = CLOSE_UP_LENGTHS * length
     (left, bottom, turn), arrivals = world.origin, list[tuple[str, Problem, Plan]]()
     frame = Alignment((left / scale, bottom / scale), -turn)
     drives = zip(stops, route.problems, route.plans(vehicle), strict=True)
@@ -150,26 +150,30 @@ def _arrivals(
             continue
         plan = from_canonical(driven, frame)
         goal = placed(world, scale * np.array([stop.place]))[0] / scale
-        outside = np.abs(plan.states[:, :2] - goal).max(axis=1) > reach - 0.5 * length
+        off = np.abs(plan.states[:, :2] - goal).max(axis=1)
+        cusps = off[cusps_of(plan, vehicle)[-1:]]
+        near = max([0.0, *cusps[cusps < _CUSP_LENGTHS * length].tolist()])
+        reach = max(CLOSE_UP_LENGTHS * length, near + 1.2 * length)
+        outside = off > reach - length
         first = int(np.flatnonzero(outside)[-1]) + 1 if outside[:-1].any() else 0
         last = Plan(plan.states[first:], plan.controls[first:], plan.dt)
         bounds = (*(goal - reach).tolist(), *(goal + reach).tolist())
         pieces = (placed(world, scale * piece) / scale for piece in problem.obstacles.pieces())
-        near = [piece for piece in pieces if (piece.max(axis=0) > bounds[:2]).all()
-                and (piece.min(axis=0) < bounds[2:]).all()]  # fmt: skip
+        around = [piece for piece in pieces if (piece.max(axis=0) > bounds[:2]).all()
+                  and (piece.min(axis=0) < bounds[2:]).all()]  # fmt: skip
         x, y, heading, _, *others = last.states[0].tolist()
-        around = replace(
+        shown = replace(
             problem,
             start=(x, y, heading),
             start_motion=(0.0, *others),  # no arrow for its speed
             goal=tuple(goal.tolist()),
             arrival=stop.arrival._replace(heading=(stop.arrival.heading or 0.0) + turn),
             bounds=bounds,
-            obstacles=obstacles_of([near]),
+            obstacles=obstacles_of([around]),
             scale=scale,
         )
         title = f"into goal {number}" if len(stops) > 1 else "into the goal"
-        arrivals.append((title, around, last))
+        arrivals.append((title, shown, last))
     return arrivals
 
 

@@ -62,6 +62,9 @@ class LatticeSettings(NamedTuple):
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
+    pose_longer: float = (
+        1.1  # times as long as if nothing were in the way: a drive to a pose should take no more
+    )
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight ...
     joining_slice: int = 256  # ... and at most so many each time that it has a turn later
 
@@ -108,11 +111,12 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                 fill_cost_to_go(cells, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
             if suits(goal, vehicle):
                 manoeuvring = Manoeuvring(query, goal, cells)
+                expected_s = settings.pose_longer * manoeuvring.least_seconds
                 if query.endings is not None:
                     joining = manoeuvring.joining(query, query.endings)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle, settings.sharpest)
         tried += 1
-        if trial == 0 and ahead.table is NO_TABLE:  # to a pose it is not known around obstacles
+        if trial == 0 and ahead.table is NO_TABLE:
             expected_s = expected_seconds(tree.states, ahead, level.heading_s, level.late_s, vehicle)
         if improving:
             level = varied(level, settings.improving_greed, query)

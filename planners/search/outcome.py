@@ -58,4 +58,4 @@ class Outcome:
     search_seconds: float
     joined: bool = False  # whether the plan ends with one of the query's endings
     others: tuple[Other, ...] = ()  # drives of other kinds, if the query asks for them
-    expected_s: float | None = None  # how long a drive to a place should take, by what was known before
+    expected_s: float | None = None  # how long a drive should take, by what was known before

@@ -31,7 +31,8 @@ AS_MANY = 8  # ... so many times as many as the first one had, ...
 MOST_AGAIN = 8000  # ... and so many at most
 FOR_AGAIN = 0.5  # of the seconds left: the rest is for the polish
 LONG = 0.05  # share of its time by which a drive may take longer than was expected ...
-A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer
+A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer, ...
+TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
@@ -167,7 +168,8 @@ def _searched_and_polished(
     too_long_s = 0.0 if expected_s is None else plan.duration_s - expected_s
     if varies or cost_of(plan, vehicle) >= below_s or too_long_s <= LONG * plan.duration_s:
         return answer, rough
-    worth = int(A_SECOND * too_long_s)
+    to_pose = query.problem.arrival is not None and query.problem.arrival.heading is not None
+    worth = int(A_SECOND * (TO_POSE if to_pose else 1) * too_long_s)
     answer, anew = _improved(planner, query, seed, answer, worth, until)
     return answer, anew or rough
 

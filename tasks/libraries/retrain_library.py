@@ -150,7 +150,9 @@ def _retrained(
     if judgement is None:
         return RetrainedLibrary(out, counts, version, verdict, summary, "", [])
     if verdict != REFUSED and judgement.alone.high_s < 0.0:
-        _LOG.warning("%s: %s.", title, HARM)
+        count = judgement.alone.problems
+        few = f"; {count} questions are too few to refuse it, {FEWEST} would do" if count < FEWEST else ""
+        _LOG.warning("%s: %s%s.", title, HARM, few)
     tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
     return RetrainedLibrary(out, counts, version, verdict, summary, _beside(judgement), tables)
 

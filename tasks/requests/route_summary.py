@@ -12,8 +12,9 @@ from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
 from planners.routes.route import SOURCES, Route
+from planners.world.arrays import Floats
 from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
-from planners.world.problem import Plan
+from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import LEAST_BACKWARDS_M
@@ -99,18 +100,12 @@ def route_summary(
     parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
     lines.append("; ".join(parts))
     ends = [
-        section[-1].end if section else problem.start
+        section[-1].end if section else start_state(problem, assistant.vehicle)
         for problem, section in zip(route.problems, route.sections, strict=True)
     ]
-    off = [
-        f"{scale * math.dist(end[:2], stop.place):.2f} m"
-        for stop, end in zip(stops, ends, strict=True)
-        if not stop.is_pose
-    ]
-    if off:
-        allowed = scale * max(stop.radius for stop in stops if not stop.is_pose)
-        place = f"the place{'s' * (len(off) > 1)} asked for"
-        lines.append(f"stops {', '.join(off)} from {place}; --goal-radius allows {allowed:g} m")
+    stopped = list(zip(stops, ends, strict=True))
+    lines += _off_places([each for each in stopped if not each[0].is_pose], scale)
+    lines += _off_poses([each for each in stopped if each[0].is_pose], scale)
     if has_memory:
         share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
         lines.append(
@@ -123,6 +118,39 @@ def route_summary(
         f"{_count(len(local_seconds), 'local plan')} took {1000.0 * sum(local_seconds):.2f} ms, the whole "
         f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
     ]
+
+
+def _off_places(stopped: Sequence[tuple[Stop, Floats]], scale: float) -> list[str]:
+    """A line that says how far from places the vehicle stops, each in a state ``[S]``."""
+    if not stopped:
+        return []
+    off = [f"{scale * math.dist(end[:2], stop.place):.2f} m" for stop, end in stopped]
+    allowed = scale * max(stop.radius for stop, _ in stopped)
+    place = f"the place{'s' * (len(off) > 1)} asked for"
+    return [f"stops {', '.join(off)} from {place}; --goal-radius allows {allowed:g} m"]
+
+
+def _off_poses(stopped: Sequence[tuple[Stop, Floats]], scale: float) -> list[str]:
+    """Lines that say how far from poses it stops, each in a state ``[S]``, and how trailers stand there."""
+    if not stopped:
+        return []
+    poses = f"the pose{'s' * (len(stopped) > 1)} asked for"
+    off = [
+        f"{scale * math.dist(end[:2], stop.place):.2f} m and "
+        f"{abs(math.remainder(end[2] - (stop.arrival.heading or 0.0), math.tau)):.3f} rad"
+        for stop, end in stopped
+    ]
+    asked = stopped[0][0]
+    turn = asked.arrival.heading_tolerance
+    lines = [
+        f"stops {', '.join(off)} from {poses}; --goal-tolerance allows {scale * asked.radius:g},{turn:g}"
+    ]
+    hitches = [", ".join(f"{hitch:.2f}" for hitch in end[5:]) for _, end in stopped]
+    if hitches[0] and not asked.arrival.hitches:
+        lines.append(
+            f"there trailers stand at {'; '.join(hitches)} rad; --goal-hitch 0 asks for them straight"
+        )
+    return lines
 
 
 def _rounded(figure: float) -> str:

@@ -126,7 +126,7 @@ class Manoeuvring:
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
         # costs are not compared with it: who pays for more than time has a search by time alone as well
-        self._least_s = self._least_seconds() if counting_time(vehicle) == vehicle else math.inf
+        self.least_seconds = self._least_seconds() if counting_time(vehicle) == vehicle else math.inf
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
         self._grow(0)  # compiled, if need be, before the planner's clock runs
@@ -225,7 +225,7 @@ class Manoeuvring:
         """Whether all that was found takes long, and only the tree out of the goal has grown."""
         if self.meets or not self._stands or self._grows_both or not self.kept:
             return False
-        return self._found.least_seconds > DETOUR * self._least_s
+        return self._found.least_seconds > DETOUR * self.least_seconds
 
     def _search_from_start(self, end: int, until: float) -> None:
         """Search once more, out of the start alone, and keep what is found.

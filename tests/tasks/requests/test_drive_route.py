@@ -97,7 +97,9 @@ def test_a_route_at_a_scale_over_a_turned_map_can_be_driven(
     assert picture.stat().st_size > 10_000
 
 
-def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path) -> None:
+def test_a_route_begins_in_motion_and_ends_in_a_pose(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out, picture = tmp_path / "plan.json", tmp_path / "route.png"
     begin, end, heading = placed(8.0, 6.0), placed(150.0, 190.0), 1.0 + TURNED[2]
     asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--goal-tolerance", "0.06,0.02"]
@@ -107,7 +109,12 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     written = json.loads(out.read_text())
     assert written["states"][0][3:] == [1.5, -0.1]
     last = written["states"][-1]
-    assert math.dist(last[:2], end) <= 0.06
+    off = math.dist(last[:2], end)
+    assert off <= 0.06
+    told = re.search(r"stops ([\d.]+) m and ([\d.]+) rad from the pose", capsys.readouterr().out)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(off, abs=0.006)
+    assert float(told[2]) == pytest.approx(abs(math.remainder(last[2] - heading, math.tau)), abs=6e-4)
     assert abs(math.remainder(last[2] - heading, math.tau)) <= 0.02
     assert last[3] == pytest.approx(0.0, abs=1e-8)
     assert in_free_cells(np.array(written["states"]))
