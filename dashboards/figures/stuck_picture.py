@@ -63,7 +63,7 @@ def stuck_picture(
     places = np.array([start[:2], stuck.place, *(stop.place for stop in stops)])
     view = view_around(world, [places], scale, vehicle)
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    is_on_map = all(0.0 <= scale * each <= side for each, side in zip(stuck.place, world.size, strict=True))
+    is_on_map = world.holds(scale * stuck.place[0], scale * stuck.place[1])
     figure, axes, close_ups = figure_over(
         world,
         view,

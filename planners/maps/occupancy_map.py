@@ -31,6 +31,11 @@ class OccupancyMap:
         rows, columns = self.occupied.shape
         return columns * self.resolution, rows * self.resolution
 
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a point (m, m), in grid coordinates, lies on the grid."""
+        width, height = self.size
+        return 0.0 <= x <= width and 0.0 <= y <= height
+
     def is_free(self, points: Floats) -> Cells:
         """Whether each of ``points [n, 2]``, in grid coordinates, lies in a free cell."""
         columns, rows = np.floor(points / self.resolution).astype(np.int64).T

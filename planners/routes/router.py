@@ -146,24 +146,24 @@ class Router:
         state = self._state(start, motion)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             who = self._blocked_body(state)
-            where = "in an obstacle or across the map's edge" if self._holds(start[:2]) else "outside the map"
+            where = (
+                "in an obstacle or across the map's edge"
+                if self._world.holds(*start[:2])
+                else "outside the map"
+            )
             return Stuck(start[:2], f"{who} would stand {where}", 0)
         for number, (stop, to_stop) in enumerate(
             zip(stops, self._problems(start, stops, motion), strict=True)
         ):
             goal = _goal_name(number, stops)
             if not point_is_free(*stop.place, self._scene):
-                where = "in an obstacle" if self._holds(stop.place) else "outside the map"
+                where = "in an obstacle" if self._world.holds(*stop.place) else "outside the map"
                 return Stuck(stop.place, f"{goal} lies {where}", 0)
             if lacks_room(to_stop, self._vehicle, self._scene):
                 who = self._blocked_body(unfolded(to_stop, self._vehicle))
                 pose = f"the pose of {goal}" if len(stops) > 1 else "the goal pose"
                 return Stuck(stop.place, f"{who} has no room in {pose}", 0)
         return None
-
-    def _holds(self, place: Point) -> bool:
-        """Whether a place lies in the map."""
-        return all(0.0 <= along <= size for along, size in zip(place, self._world.size, strict=True))
 
     def _begun(self, start: Pose, motion: tuple[float, ...]) -> Problem:
         return replace(self._whole, start=start, start_motion=motion)

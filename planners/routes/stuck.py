@@ -26,10 +26,8 @@ class Stuck(NamedTuple):
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
         line = f"{self.why}, at {_told_place(self.place, world, scale)}"
-        left, up = scale * self.place[0], scale * self.place[1]
-        width, height = world.size
-        if not (0.0 <= left <= width and 0.0 <= up <= height):
-            x, y, turn = world.origin
+        if not world.holds(scale * self.place[0], scale * self.place[1]):
+            (width, height), (x, y, turn) = world.size, world.origin
             line += f"; the map is {width:g} by {height:g} m, from its corner at ({x:.2f}, {y:.2f})"
             line += f", turned by {turn:.2f} rad" if turn else ""
         if self.to_go is not None:

@@ -62,9 +62,7 @@ class LatticeSettings(NamedTuple):
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
-    pose_longer: float = (
-        1.1  # times as long as if nothing were in the way: a drive to a pose should take no more
-    )
+    pose_longer: float = 1.1  # times as long as with nothing in the way: so long may a drive to a pose take
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight ...
     joining_slice: int = 256  # ... and at most so many each time that it has a turn later
 
