@@ -67,13 +67,18 @@ def test_a_hall_behind_a_thin_wall_does_not_count(slit: int) -> None:
     assert 1.0 - 1e-9 <= gap.width <= 1.1 + 1e-9
 
 
-@given(resolution=st.sampled_from([0.5, 1.0, 2.0]), cells=st.integers(1, 8))
-def test_doors_of_coarse_maps_are_never_told_too_narrow(resolution: float, cells: int) -> None:
+def coarse_door(resolution: float, cells: int) -> OccupancyMap:
+    """A wall across a map of 40 x 30 cells, with a door."""
     occupied = np.zeros((30, 40), bool)
     occupied[:, 20] = True
     occupied[10 : 10 + cells, 20] = False
+    return OccupancyMap("coarse", occupied, resolution)
+
+
+@given(resolution=st.sampled_from([0.5, 1.0, 2.0]), cells=st.integers(1, 8))
+def test_doors_of_coarse_maps_are_never_told_too_narrow(resolution: float, cells: int) -> None:
     far = 39.9 * resolution, 29.9 * resolution
-    gap = narrowest_gap(OccupancyMap("coarse", occupied, resolution), (0.0, 0.0), far)
+    gap = narrowest_gap(coarse_door(resolution, cells), (0.0, 0.0), far)
     assert gap is not None
     assert resolution * cells <= gap.width + 1e-9 <= resolution * (cells + 1) + 1e-6
 
@@ -81,12 +86,8 @@ def test_doors_of_coarse_maps_are_never_told_too_narrow(resolution: float, cells
 @given(resolution=st.sampled_from([0.5, 1.0, 2.0]), cells=st.integers(1, 8))
 def test_the_width_of_doors_that_matter_is_told_exactly_on_coarse_maps(resolution: float, cells: int) -> None:
     """A door of one cell counted as two cells wide, so no vehicle was led through it."""
-    occupied = np.zeros((30, 40), bool)
-    occupied[:, 20] = True
-    occupied[10 : 10 + cells, 20] = False
     far = 39.9 * resolution, 29.9 * resolution
-    world = OccupancyMap("coarse", occupied, resolution)
-    gap = narrowest_gap(world, (0.0, 0.0), far, most=3.9 * resolution)
+    gap = narrowest_gap(coarse_door(resolution, cells), (0.0, 0.0), far, most=3.9 * resolution)
     assert (gap is None) == (cells > 3)
     assert gap is None or gap.width == pytest.approx(cells * resolution)
 
