@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from unittest import mock
 
 import numpy as np
@@ -79,6 +80,24 @@ def test_what_arrives_forwards_is_a_cheaper_plan(away: float, bearing: float, he
     if better is not None:
         assert faults(problem, better, CAR_1_TRAILER) == []
         assert cost_of(better, CAR_1_TRAILER) < cost_of(plan, CAR_1_TRAILER)
+
+
+@pytest.mark.parametrize(
+    ("goal", "speed"),
+    [((35.78, 29.6, -2.846), 0.52), ((29.41, 38.68, 0.661), 1.59), ((28.22, 33.27, 1.424), 0.76)],
+)
+def test_a_loop_from_the_start_begins_as_the_train_moves(
+    goal: tuple[float, float, float], speed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It began at rest, wherever the train was in motion."""
+    problem = replace(asked(goal), start_motion=(speed,))
+    plan = solve(problem, "lattice", vehicle=CAR_1_TRAILER, polished=False).plan
+    assert plan is not None
+    monkeypatch.setattr(forward_arrivals, "_beginnings", lambda *_: [0])
+    monkeypatch.setattr(forward_arrivals, "_backs_in", lambda *_: True)
+    better = forwards(problem, plan)
+    assert better is not None
+    assert faults(problem, better, CAR_1_TRAILER) == []
 
 
 def test_loops_are_laid_only_where_a_train_backs_in_and_could_drive_in(
