@@ -107,7 +107,7 @@ def _promising(
             rows = lay_loop(drive.states, loops, k, start, vehicle) if least < below else 0
             if rows > 1:
                 way = np.concatenate([plan.states[:begins], drive.states[:rows]])
-                way[0] = plan.states[0]
+                way[0] = plan.states[0]  # it may be in motion, where the loop begins at the start, too
                 found.append((least, longer, way, tuple(np.sign(loops.bends[k]).tolist())))
     found.sort(key=lambda each: each[0])
     of_kinds: dict[tuple[float, ...], Floats] = {}
