@@ -67,8 +67,7 @@ def usual_limits(problem: Problem, seconds: float | None = None) -> Limits:
         problem: what is asked.
         seconds: after which planning has to end; None: as usual.
     """
-    is_pose = problem.arrival is not None and problem.arrival.heading is not None
-    expansions = POSE_EXPANSIONS if is_pose else Limits.expansions
+    expansions = POSE_EXPANSIONS if problem.asks_for_pose else Limits.expansions
     return Limits(expansions=expansions, seconds=Limits.seconds if seconds is None else seconds)
 
 

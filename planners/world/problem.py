@@ -68,6 +68,11 @@ class Problem:
     arrival: Arrival | None = None  # None: any heading and speed will do
     offset: Point = (0.0, 0.0)  # real metres: where the origin of this frame lies in that of the file
 
+    @property
+    def asks_for_pose(self) -> bool:
+        """Whether the heading at the goal matters."""
+        return self.arrival is not None and self.arrival.heading is not None
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:

@@ -213,7 +213,7 @@ def judge_piece(piece: JudgedPiece) -> None:
             workspace=workspace,
         )
 
-    kinds = {_is_pose(question): question for question in questions}
+    kinds = {question.asks_for_pose: question for question in questions}
     for question, number in product(kinds.values(), range(len(sides))):
         attempt(question, number)  # anything made on first use exists before time counts
     attempts = in_turn(questions, len(sides), seed, attempt)
@@ -267,7 +267,3 @@ def _questions(request: GatherRequest, _digest: str) -> Sequence[Problem]:
             found[identity] = replace(to_canonical(drawn)[0], id=identity)
         number += 1
     return list(found.values())
-
-
-def _is_pose(question: Problem) -> bool:
-    return question.arrival is not None and question.arrival.heading is not None
