@@ -144,7 +144,9 @@ class LegSearch:
             briefly = VERY_BRIEFLY if ahead.briefly else BRIEFLY
             limits = briefly if goal.brief else usual_limits(problem)
             left = max(self._until - working_clock(), 0.0)
-            attempt = self._solve(problem, replace(limits, seconds=min(limits.seconds, left)))
+            # on the way there are other goals to try
+            limits = replace(limits, seconds=min(limits.seconds, left), second=goal.final and not goal.brief)
+            attempt = self._solve(problem, limits)
             if attempt.plan is None:
                 self._is_enclosed = goal.final and attempt.status == Status.GOAL_ENCLOSED
                 continue

@@ -27,7 +27,7 @@ from planners.search.structures.cost_to_go import (
 from planners.search.structures.frontier import (
     allocate_frontier,
 )
-from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of, expected_seconds
+from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of, expected_seconds, way_from
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, drawing_of, window_of
@@ -62,6 +62,8 @@ class LatticeSettings(NamedTuple):
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
+    winding: float = 1.3  # times the straight line, and ...
+    winding_m: float = 5.0  # ... metres, beyond which the way over the cells winds
     pose_longer: float = 1.1  # times as long as with nothing in the way: so long may a drive to a pose take
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight ...
     joining_slice: int = 256  # ... and at most so many each time that it has a turn later
@@ -92,6 +94,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     joined = False
     squeezed: Plan | None = None
     expected_s: float | None = None
+    winds = False
     may_squeeze = not improving
     may_stop = not improving and query.prefix is None
 
@@ -101,12 +104,14 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return drawing_of(query.problem, query.workspace).occupied
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead, manoeuvring, joining, expected_s
+        nonlocal level, tried, ahead, manoeuvring, joining, expected_s, winds
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             cells = occupied()
             if not query.knows_way:
                 fill_cost_to_go(cells, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+            straight = math.hypot(goal[X] - tree.states[0, 0], goal[Y] - tree.states[0, 1])
+            winds = way_from(tree.states, go, vehicle)[0] > settings.winding * straight + settings.winding_m
             if suits(goal, vehicle):
                 manoeuvring = Manoeuvring(query, goal, cells)
                 expected_s = settings.pose_longer * manoeuvring.least_seconds
@@ -244,7 +249,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + working_clock() - began,
         )
-    outcome = replace(outcome, expected_s=expected_s)
+    outcome = replace(outcome, expected_s=expected_s, winds=winds)
     if joining is None:
         return outcome
     return replace(

@@ -59,3 +59,4 @@ class Outcome:
     joined: bool = False  # whether the plan ends with one of the query's endings
     others: tuple[Other, ...] = ()  # drives of other kinds, if the query asks for them
     expected_s: float | None = None  # how long a drive should take, by what was known before
+    winds: bool = False  # whether the way over cells is much longer than straight on, or leads through walls

@@ -35,6 +35,7 @@ A_SECOND = 1000  # ... else it is improved, with so many expansions for each sec
 TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
+SECOND = {"lattice": "follow"}  # planners that are asked as well where one finds nothing, or the way winds
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
@@ -121,7 +122,38 @@ def _searched_and_polished(
     """As ``search_and_polish``, once."""
     until = working_clock() + query.limits.seconds
     query, vehicle = asking_for_kinds(planner, query), query.vehicle
-    varies = query.others
+    found, (answer, rough) = _first_answer(planner, query, seed, given, below_s, until)
+    is_worth = answer.status is Status.BUDGET_SPENT if answer.plan is None else found.winds
+    if planner in SECOND and query.limits.second and is_worth and not query.others:
+        left = replace(query.limits, seconds=max(until - working_clock(), 0.0))
+        rng = generator(seed, "second", query.problem.id, planner)
+        second = replace(query, rng=rng, limits=left, beside=None)
+        answers = [(answer, rough), _first_answer(SECOND[planner], second, seed, None, below_s, until)[1]]
+        cheapest, rough = _cheapest(answers, vehicle)
+        answer = _with_work([each for each, _ in answers], cheapest)
+    plan, expected_s = answer.plan, found.expected_s
+    too_long_s = 0.0 if plan is None or expected_s is None else plan.duration_s - expected_s
+    if (
+        plan is None
+        or query.others
+        or cost_of(plan, vehicle) >= below_s
+        or too_long_s <= LONG * plan.duration_s
+    ):
+        return answer, rough
+    worth = int(A_SECOND * (TO_POSE if query.problem.asks_for_pose else 1) * too_long_s)
+    answer, anew = _improved(planner, query, seed, answer, worth, until)
+    return answer, anew or rough
+
+
+def _first_answer(
+    planner: str, query: Query, seed: int, given: Plan | None, below_s: float, until: float
+) -> tuple[Outcome, tuple[Outcome, Plan | None]]:
+    """Search for several plans with one planner, and polish them.
+
+    Returns:
+        The outcome of the first search; and the answer with the work of all, and what its plan was before.
+    """
+    vehicle, varies = query.vehicle, query.others
     if math.isfinite(below_s):
         worth = int(PER_SQUARE_SECOND * below_s * below_s)
         query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))
@@ -151,7 +183,7 @@ def _searched_and_polished(
     solved = [solved[k] for k in sorted(cheapest)]  # a given plan first: it stays unless another is quicker
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
-        return found[0], None
+        return found[0], (found[0], None)
     number, polished = polish_quickest(
         *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
         seconds=until - working_clock(),
@@ -164,14 +196,7 @@ def _searched_and_polished(
         polished = polish(query.problem, forwards, *around, seconds=until - working_clock())
         best, rough = replace(best, joined=rough is given), forwards  # it begins as the other drive, no more
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
-    plan, expected_s = polished.plan or rough, found[0].expected_s
-    too_long_s = 0.0 if expected_s is None else plan.duration_s - expected_s
-    if varies or cost_of(plan, vehicle) >= below_s or too_long_s <= LONG * plan.duration_s:
-        return answer, rough
-    to_pose = query.problem.arrival is not None and query.problem.arrival.heading is not None
-    worth = int(A_SECOND * (TO_POSE if to_pose else 1) * too_long_s)
-    answer, anew = _improved(planner, query, seed, answer, worth, until)
-    return answer, anew or rough
+    return found[0], (answer, rough)
 
 
 def _improved(

@@ -10,9 +10,12 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
+import math
 import os
 import sys
 from pathlib import Path
+
+import numpy as np
 
 from planners.maps.questions import question_in
 from planners.solve import solve
@@ -21,8 +24,9 @@ from planners.world.authority.authority import faults
 from planners.world.classes.families import family
 from planners.world.classes.problem_classes import problem_class
 from planners.world.compiling import working_clock
-from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.problem import Arrival, Problem, obstacles_of, start_state
+from planners.world.vehicles.vehicle import Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_library
 from storage.vehicles.vehicle_files import said_vehicle
@@ -31,7 +35,13 @@ WARM = 6  # problems of another seed that are solved before, so that kernels are
 
 
 def drawn(kind: str, name: str, vehicle: Vehicle, count: int, seed: int) -> list[Problem]:
-    """Problems of a family (its difficulty is the name), or of a class: canonical, to places or to poses."""
+    """Problems of a family (its difficulty is the name), or of a class: canonical, to places or to poses.
+
+    Of ``doors`` the name is ``place`` or ``pose``.
+    """
+    if kind == "doors":
+        rngs = (np.random.default_rng([seed, index]) for index in range(count))
+        return [to_canonical(through_doors(rng, vehicle, name == "pose"))[0] for rng in rngs]
     if kind not in ("canonical", "place", "pose"):
         source = family(kind, name, vehicle)
         return [to_canonical(source.draw(seed, index))[0] for index in range(count)]
@@ -40,6 +50,35 @@ def drawn(kind: str, name: str, vehicle: Vehicle, count: int, seed: int) -> list
         return problems
     asked = (question_in(each, k, seed, vehicle, pose=kind == "pose") for k, each in enumerate(problems))
     return [to_canonical(question)[0] for question in asked if question is not None]
+
+
+def through_doors(rng: np.random.Generator, vehicle: Vehicle, pose: bool) -> Problem:
+    """From rest through three rooms of 10 x 21 m, by doors 1.3 to 2.2 times as wide as the vehicle."""
+    widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
+    walls = []
+    for x in (10.0, 20.0):
+        wide = rng.uniform(1.3, 2.2) * widest
+        low = rng.uniform(1.0, 20.0 - wide)
+        for bottom, top in ((0.0, low), (low + wide, 21.0)):
+            walls.append([[x - 0.1, bottom], [x + 0.1, bottom], [x + 0.1, top], [x - 0.1, top]])
+    for _ in range(6):
+        x, y, half = rng.uniform(0.0, 30.0), rng.uniform(0.0, 21.0), rng.uniform(0.3, 0.9)
+        if min(abs(x - 10.0), abs(x - 20.0)) > 2.0 + half:
+            walls.append(
+                [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]]
+            )
+    while True:
+        start = rng.uniform(1.0, 8.0), rng.uniform(1.0, 20.0), rng.uniform(-math.pi, math.pi)
+        goal, heading = (rng.uniform(22.0, 29.0), rng.uniform(1.0, 20.0)), rng.uniform(-math.pi, math.pi)
+        problem = Problem(
+            *("doors", "doors", start, goal, 0.1 if pose else 0.5, (0.0, 0.0, 30.0, 21.0)),
+            obstacles_of([[np.array(wall)] for wall in walls]),
+            arrival=Arrival(heading, 0.05, 0.0, 0.0) if pose else None,
+        )
+        ends = np.stack([start_state(problem, vehicle)] * 2)
+        ends[1, :3] = *goal, heading
+        if count_free_prefix(ends, vehicle, scene_of(problem)) == len(ends):
+            return problem
 
 
 def digest_of(problem: Problem) -> str:

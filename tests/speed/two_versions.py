@@ -2,7 +2,8 @@
 
 ``python -m tests.speed.two_versions OLD NEW [--asked car:perpendicular:hard …] [--questions 60] [--seed 92]
 [--core 0] [--memory LIBRARY]``: OLD and NEW are folders with a checkout each. What is asked is
-``VEHICLE:FAMILY:DIFFICULTY``, or ``VEHICLE:KIND:CLASS`` with a kind of ``canonical``, ``place`` and ``pose``.
+``VEHICLE:FAMILY:DIFFICULTY``, ``VEHICLE:KIND:CLASS`` with a kind of ``canonical``, ``place`` and ``pose``, or
+``VEHICLE:doors:place`` and ``VEHICLE:doors:pose``, through rooms with doors.
 
 The lattice solves each problem once with either version, directly one after the other, so that both meet the
 same load of the machine; which one begins changes from problem to problem. Six problems of another seed come
