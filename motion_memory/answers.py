@@ -18,7 +18,7 @@ class Answer:
 
     problem_id: str
     status: str  # "solved", or how planning failed (planners.search.outcome.Status)
-    source: str | None  # "recalled", "repaired" or "searched"; None when not solved
+    source: str | None  # "recalled", "repaired", "searched" or "kept"; None when not solved
     plan: Plan | None  # in the frame and units of the given problem; None when not solved
     planning_seconds: float  # from convex pieces in the canonical frame to the plan
     call_seconds: (

@@ -9,6 +9,7 @@ import numpy as np
 
 from motion_memory.answers import RouteAnswer
 from motion_memory.array_problems import motion_given, numbers_given
+from motion_memory.given_plans import check_current
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.leg_search import Solve
 from planners.routes.router import Router
@@ -16,6 +17,7 @@ from planners.routes.stuck import Stuck
 from planners.world.alignment import scaled
 from planners.world.arrays import Point, Pose
 from planners.world.compiling import working_clock
+from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
@@ -28,6 +30,7 @@ from tasks.requests.map_routes import (
     check_route,
     checked_motion,
     in_frame_of,
+    in_grid_of,
     stops_over,
 )
 from tasks.settings.checks import check_time_limit, is_number
@@ -81,6 +84,7 @@ class MapRouter:
         goal_tolerance: tuple[float, float] | None = None,
         goal_hitches: Sequence[float] = (),
         time_limit: float | None = None,
+        current: Plan | None = None,
     ) -> RouteAnswer:
         """Find a drive from a pose through all goals, at each of which it stops; or say where it is stuck.
 
@@ -94,6 +98,8 @@ class MapRouter:
             goal_hitches: hitch angles in poses, rad, one for each trailer; none: as they come.
             time_limit: seconds, after which the search ends as stuck, and a polish with what it has; what is
                 found by then depends on the machine. None: no limit.
+            current: the plan that the robot drives now, as an earlier answer held it. What is left of it from
+                the start through all goals is the answer unless another drive is quicker.
 
         Raises:
             ValueError: an argument is no such numbers, no goal takes it, or the vehicle cannot move or stand
@@ -120,9 +126,10 @@ class MapRouter:
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
         check_time_limit(time_limit, "time_limit")
+        driven = None if current is None else self._in_grid(current)
         self._solver.seconds.clear()
         began = working_clock()
-        route = self._router.route((x / scale, y / scale, heading), stops, motion, time_limit)
+        route = self._router.route((x / scale, y / scale, heading), stops, motion, time_limit, driven)
         seconds = working_clock() - began
         if isinstance(route, Stuck):
             why = route.told(self._world, scale)
@@ -130,9 +137,14 @@ class MapRouter:
         plan = route.plan(self._vehicle)
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
-        driven = scaled(in_frame_of(self._world, plan, scale), scale)
+        answer = scaled(in_frame_of(self._world, plan, scale), scale)
         found = tuple((*each, self._vehicle) for each in route.new_attempts(scale))
-        return RouteAnswer("solved", route.source, driven, None, len(self._solver.seconds), seconds, found)
+        return RouteAnswer("solved", route.source, answer, None, len(self._solver.seconds), seconds, found)
+
+    def _in_grid(self, current: Plan) -> Plan:
+        """A plan in the map's frame, in canonical metres of its grid. Raises UsageError if it is none."""
+        check_current(current, self._vehicle)
+        return in_grid_of(self._world, scaled(current, 1.0 / self._scale), self._scale)
 
 
 def _finite(name: str, given: Sequence[float], *meanings: str) -> list[float]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from motion_memory.answers import Answer, RouteAnswer
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.extras import may_lack
+from motion_memory.given_plans import check_current, check_plan
 from motion_memory.plain import plain
 from planners.attempt import NEW, Attempt
 from planners.memory.library.plan_library import PlanLibrary
@@ -20,7 +21,7 @@ from planners.memory.memory import scale_fault
 from planners.ranked_plans import RankedPlan, ranked_plans
 from planners.search.query import Limits, usual_limits
 from planners.solve import improved, solve
-from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
+from planners.world.alignment import from_canonical, in_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, Plan, Problem
@@ -68,6 +69,7 @@ class Memory:
         *,
         time_limit: float | None = None,
         improve_seconds: float = 0.0,
+        current: Plan | None = None,
     ) -> Answer:
         """Plan for one problem; if there is no plan, the answer says so.
 
@@ -78,14 +80,17 @@ class Memory:
             time_limit: seconds of planning, after which the best plan so far is the answer; what that is then
                 depends on the machine. By default planning ends by its work, in the same way on any machine.
             improve_seconds: seconds to go on looking for a better plan, or for a first one.
+            current: the plan that the robot drives now, as an earlier answer held it, in this problem's
+                frame. What is left of it from the start is the answer unless another plan is quicker; so who
+                plans again while driving never arrives later for it, as long as the plan stays free.
 
         Raises:
-            ValueError: the problem is malformed or impossible, the memory is not made for its scale, or a
-                time is no possible number of seconds.
+            ValueError: the problem is malformed or impossible, the memory is not made for its scale, a time
+                is no possible number of seconds, or the current plan is none of this vehicle.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        return self._planned(self._read(problem), began, time_limit, improve_seconds)
+        return self._planned(self._read(problem), began, time_limit, improve_seconds, current)
 
     def plan_arrays(
         self,
@@ -101,6 +106,7 @@ class Memory:
         *,
         time_limit: float | None = None,
         improve_seconds: float = 0.0,
+        current: Plan | None = None,
     ) -> Answer:
         """Plan for a problem that is already in arrays; otherwise like ``plan``.
 
@@ -122,10 +128,12 @@ class Memory:
                 with tolerances.
             time_limit: as for ``plan``.
             improve_seconds: as for ``plan``.
+            current: as for ``plan``.
 
         Raises:
             ValueError: an array has another shape, the goal is a pose and there is an arrival too, the
-                problem is impossible, or a time is no possible number of seconds.
+                problem is impossible, a time is no possible number of seconds, or the current plan is none of
+                this vehicle.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
@@ -133,7 +141,7 @@ class Memory:
             *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
             vehicle=self.vehicle,
         )
-        return self._planned(problem, began, time_limit, improve_seconds)
+        return self._planned(problem, began, time_limit, improve_seconds, current)
 
     def router(
         self, world: OccupancyMap, *, scale: float | None = None, tolerance_m: float = 0.0
@@ -210,13 +218,9 @@ class Memory:
             UsageError: What is given is no plan.
             ValueError: The problem is malformed or impossible.
         """
-        if not isinstance(plan, Plan):
-            raise UsageError(
-                f"plan is {short(plan)}: give the plan of an answer, which has one if it is solved."
-            )
+        check_plan("plan", plan)
         read = self._read(problem)
-        near = shifted(plan, (-read.offset[0], -read.offset[1]))
-        return faults(read, scaled(near, 1.0 / read.scale), self.vehicle)
+        return faults(read, _in_frame_of(read, plan), self.vehicle)
 
     def learn(self, answers: Answer | RouteAnswer | Iterable[Answer | RouteAnswer], data: str | Path) -> int:
         """Keep plans that no memory had, for later libraries and runs (docs/learning-on-the-job.md).
@@ -266,13 +270,22 @@ class Memory:
         return problem_of(plain(fields), "problem", self.vehicle)
 
     def _planned(
-        self, problem: Problem, began: float, time_limit: float | None, improve_seconds: float
+        self,
+        problem: Problem,
+        began: float,
+        time_limit: float | None,
+        improve_seconds: float,
+        current: Plan | None,
     ) -> Answer:
         check_times(time_limit, improve_seconds, ("time_limit", "improve_seconds"))
         canonical, alignment = to_canonical(problem)
         limits = usual_limits(canonical, time_limit)
+        driven: Plan | None = None
+        if current is not None:
+            check_current(current, self.vehicle)
+            driven = in_canonical(_in_frame_of(problem, current), alignment)
         with self._workspace() as workspace:
-            attempt = self._attempt(canonical, limits, workspace, self.assist)
+            attempt = self._attempt(canonical, limits, workspace, self.assist, driven)
             if improve_seconds > 0.0:
                 attempt = improved(attempt, canonical, improve_seconds, self.vehicle, workspace)
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
@@ -283,13 +296,21 @@ class Memory:
         found = ((canonical, attempt, self.vehicle),) if attempt.source in NEW else ()
         return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found)
 
-    def _attempt(self, canonical: Problem, limits: Limits, workspace: Workspace, assist: str) -> Attempt:
+    def _attempt(
+        self,
+        canonical: Problem,
+        limits: Limits,
+        workspace: Workspace,
+        assist: str,
+        current: Plan | None = None,
+    ) -> Attempt:
         return solve(
             *(canonical, self.planner, assist, self.top_k, self.stored, self.seed, limits),
             vehicle=self.vehicle,
             strategy=self.strategy,
             workspace=workspace,
             polished=self.polished,
+            current=current,
         )
 
     @contextmanager
@@ -310,3 +331,9 @@ def _parsed(text: str) -> Any:
         return parse_json(text, "the problem")
     except StorageError as error:
         raise ValueError(str(error)) from None
+
+
+def _in_frame_of(problem: Problem, plan: Plan) -> Plan:
+    """A plan in a file's frame and real metres, in those of the problem that was read from it."""
+    near = shifted(plan, (-problem.offset[0], -problem.offset[1]))
+    return scaled(near, 1.0 / problem.scale)

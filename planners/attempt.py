@@ -13,6 +13,7 @@ SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a libra
 DRIVES = "drives"  # ... if a whole plan was moved to the problem
 FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers that a memory gave
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
+KEPT: Final = "kept"  # the source of what is left of the plan that is being driven
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Attempt:
     top_k: int  # 0 without memory
     status: str
     solved: bool
-    source: str | None  # "recalled", "repaired" or "searched"; None if not solved
+    source: str | None  # "recalled", "repaired", "searched" or "kept"; None if not solved
     planning_seconds: float
     occupancy_seconds: float
     encode_seconds: float

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import TIMED_PARTS, WITHOUT_MEMORY, Attempt
+from planners.attempt import KEPT, TIMED_PARTS, WITHOUT_MEMORY, Attempt
+from planners.current_plan import rest_of
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.free import turned
@@ -54,6 +55,7 @@ def solve(
     strategy: str | None = None,
     workspace: Workspace | None = None,
     polished: bool = True,
+    current: Plan | None = None,
 ) -> Attempt:
     """Solve a problem: try stored plans first, as the assist says, then search.
 
@@ -88,6 +90,8 @@ def solve(
         strategy: of recall, one of ``STRATEGIES``; by default what is best for the size of the memory.
         workspace: the caller's buffers; by default new ones.
         polished: whether the plan is polished; else it is the first that was found, as it was found.
+        current: the plan that is being driven, in the problem's frame and lengths: what is left of it is
+            given like a plan of a memory, so that the answer costs no more.
 
     Raises:
         ValueError: Planner, assist or strategy is unknown, the memory is missing or of another vehicle or
@@ -107,6 +111,14 @@ def solve(
             polished=polished,
             until=view.began + FOR_DRIVES * limits.seconds,
         )
+    if current is not None:
+        ends = view.began + FOR_DRIVES * limits.seconds
+        rest = rest_of(current, problem, vehicle, view.scene, view.workspace, ends)
+        if rest is not None and (
+            found.plan is None or cost_of(rest, vehicle) <= cost_of(found.plan, vehicle)
+        ):
+            found = found._replace(plan=rest, source=KEPT, is_long=False, is_polished=False)
+        view.lap("repair")
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
     if found.plan is None or found.is_long or (polished and not found.is_polished):
         limits = replace(limits, seconds=max(view.began + limits.seconds - working_clock(), 0.0))

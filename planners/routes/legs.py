@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.attempt import Attempt
+from planners.attempt import KEPT, Attempt
 from planners.optimisation.polish import polish
 from planners.world.arrays import Floats, Point
 from planners.world.driving_cost import cost_of
@@ -34,7 +34,7 @@ class Leg:
     end: Floats  # [S]
     controls: Floats  # [n, 2]
     driving: int  # how many controls follow the plan; the others brake
-    attempt: Attempt  # how the local problem was solved
+    attempt: Attempt | None  # how the local problem was solved; None: it is left of the current plan
     problem: Problem  # in the canonical frame
     goal: Point  # local or final, metres
 
@@ -44,8 +44,8 @@ class Leg:
 
     @property
     def source(self) -> str:
-        """``recalled``, ``repaired`` or ``searched``."""
-        return self.attempt.source or ""
+        """``recalled``, ``repaired``, ``searched``, or ``kept`` of the plan that is being driven."""
+        return KEPT if self.attempt is None else self.attempt.source or ""
 
 
 def joined(problem: Problem, legs: Sequence[Leg], vehicle: Vehicle) -> Plan:

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from planners.attempt import NEW, Attempt
+from planners.attempt import KEPT, NEW, Attempt
 from planners.routes.legs import Leg, joined
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
-SOURCES: Final = ("recalled", "repaired", "searched")  # of legs
+SOURCES: Final = (KEPT, "recalled", "repaired", "searched")  # of legs
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Route:
 
     @property
     def source(self) -> str:
-        """Where it comes from: "searched" if any leg was, else "repaired" if any was, else "recalled"."""
+        """Where it comes from: "searched" if any leg was, else "repaired", "recalled", or else "kept"."""
         return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
 
     def new_attempts(self, scale: float) -> list[tuple[Problem, Attempt]]:
@@ -49,7 +49,7 @@ class Route:
         by_name = {
             leg.problem.id: (replace(leg.problem, id="", scale=scale), leg.attempt)
             for leg in self.legs
-            if leg.source in NEW
+            if leg.attempt is not None and leg.source in NEW
         }
         return list(by_name.values())
 

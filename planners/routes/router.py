@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
+from planners.current_plan import rest_of
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
@@ -24,6 +25,7 @@ from planners.search.braking import is_free_drive
 from planners.search.free_goal import lacks_room, unfolded
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import note_free, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_START,
@@ -31,6 +33,7 @@ from planners.world.problem import (
     POSE_RADIUS,
     POSE_TOLERANCE,
     Arrival,
+    Plan,
     Problem,
     start_state,
 )
@@ -93,6 +96,7 @@ class Router:
         stops: Sequence[Stop],
         motion: tuple[float, ...] = (),
         time_limit: float | None = None,
+        current: Plan | None = None,
     ) -> Route | Stuck:
         """Find a route from a pose (m, m, rad) through all ``stops``.
 
@@ -102,13 +106,46 @@ class Router:
             motion: the state at the start behind the pose, speed (m/s) first; what is missing is 0.
             time_limit: seconds, after which the search ends, and the polish with what it has; what is found
                 by then depends on the machine. None: no limit.
+            current: the plan that is being driven; what is left of it is the route if none that costs less is
+                found.
         """
         until = math.inf if time_limit is None else working_clock() + time_limit
-        problems = self._problems(start, stops, motion)
         refused = self.refusal(start, stops, motion)
         if refused is not None:
             return refused
-        state = self._state(start, motion)
+        problems, state = self._problems(start, stops, motion), self._state(start, motion)
+        kept = None if current is None else self._kept(current, problems, state, until)
+        found = self._searched(problems, stops, state, until)
+        if kept is None or (isinstance(found, Route) and self._cost(found) < self._cost(kept)):
+            return found
+        return kept
+
+    def _cost(self, route: Route) -> float:
+        return cost_of(route.plan(self._vehicle), self._vehicle)
+
+    def _kept(self, current: Plan, problems: Sequence[Problem], state: Floats, until: float) -> Route | None:
+        """What is left of a plan from a ``state [S]`` on, if it leads through all stops."""
+        asked: list[Problem] = []
+        sections: list[list[Leg]] = []
+        paths = []
+        for to_stop in problems:
+            problem = _from(state, to_stop)
+            rest = rest_of(current, problem, self._vehicle, self._scene, self._workspace, until)
+            if rest is None:
+                return None
+            steps = len(rest.controls)
+            leg = Leg(rest.states[0], rest.states[-1], rest.controls, steps, None, problem, problem.goal)
+            asked.append(problem)
+            sections.append([leg] if steps else [])
+            paths.append(rest.states[:, :2])
+            state = rest.states[-1]
+        return Route(asked, sections, paths)
+
+    def _searched(
+        self, problems: list[Problem], stops: Sequence[Stop], state: Floats, until: float
+    ) -> Route | Stuck:
+        """Search a route from a ``state [S]`` through all ``stops``."""
+        problems = list(problems)
         sections: list[list[Leg]] = []
         paths = []
         self._search.begin(until)
@@ -121,8 +158,7 @@ class Router:
                 return self._at_a_gap(
                     Stuck(stop.place, why, 0), (float(state[0]), float(state[1])), stop.place
                 )
-            pose, moving = tuple(state[:3].tolist()), tuple(state[3:].tolist())
-            problems[number] = replace(problems[number], start=pose, start_motion=moving)
+            problems[number] = _from(state, problems[number])
             more = self._search.legs_to(ahead, state)
             if isinstance(more, Stuck):
                 more = self._by_other_ways(more, ahead, path, state)
@@ -137,7 +173,7 @@ class Router:
                 driven = self._vehicle, self._scene, self._workspace
                 more = polished_legs(problems[number], more, *driven, until - working_clock())
             sections.append(more)
-            paths.append(np.vstack((pose[:2], path[1:], stop.place)))
+            paths.append(np.vstack((problems[number].start[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
 
@@ -286,6 +322,12 @@ class Router:
     def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
         """Where the widest way is narrowest, if the vehicle hardly fits through there."""
         return narrowest_gap(self._world, start, goal, NARROW * self._widest)
+
+
+def _from(state: Floats, problem: Problem) -> Problem:
+    """The problem from a ``state [S]`` on."""
+    x, y, heading, *motion = state.tolist()
+    return replace(problem, start=(x, y, heading), start_motion=tuple(motion))
 
 
 def _goal_name(number: int, stops: Sequence[Stop]) -> str:

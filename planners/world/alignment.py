@@ -161,6 +161,14 @@ def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
     return Plan(states, plan.controls, plan.dt)
 
 
+def in_canonical(plan: Plan, alignment: Alignment) -> Plan:
+    """Move a plan from the frame of its problem into the canonical one, as ``to_canonical`` moved that."""
+    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
+    x, y = alignment.origin
+    moved = sin * y - cos * x, -sin * x - cos * y  # where the other frame's origin lies
+    return from_canonical(plan, Alignment(moved, -alignment.turn))
+
+
 @lean
 def _move_back(states: Floats, origin: Point, turn: float, cos: float, sin: float) -> None:
     for i in range(states.shape[0]):

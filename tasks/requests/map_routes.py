@@ -13,7 +13,7 @@ from planners.routes.leg_search import Solve
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.route import Route
 from planners.search.query import Limits
-from planners.world.alignment import Alignment, from_canonical
+from planners.world.alignment import Alignment, from_canonical, in_canonical
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import NO_OBSTACLES
 from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Plan, Problem
@@ -167,3 +167,9 @@ def in_frame_of(world: OccupancyMap, plan: Plan, scale: float) -> Plan:
     """A route's plan, in canonical metres of a map's grid, in those of the map's frame."""
     left, bottom, turn = world.origin
     return from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
+
+
+def in_grid_of(world: OccupancyMap, plan: Plan, scale: float) -> Plan:
+    """A plan in a map's frame, in canonical metres, in those of the map's grid."""
+    left, bottom, turn = world.origin
+    return in_canonical(plan, Alignment((left / scale, bottom / scale), -turn))

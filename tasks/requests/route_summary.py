@@ -39,10 +39,12 @@ def route_table(route: Route, assistant: Assistant, scale: float) -> CellTable:
     for number, leg in enumerate(route.legs, start=1):
         states, driven = leg.states(assistant.vehicle), _driven_m(leg, assistant)
         whole = Plan(states, leg.controls, assistant.vehicle.dt)
-        retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
-        used_memory = leg.attempt.assist not in WITHOUT_MEMORY
         figures = [scale * driven, scale * (whole.length_m - driven), whole.duration_s, scale * leg.begin[3]]
-        seconds = [leg.attempt.planning_seconds, retrieval if used_memory else math.nan]
+        seconds = [math.nan, math.nan]
+        if leg.attempt is not None:
+            retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
+            used_memory = leg.attempt.assist not in WITHOUT_MEMORY
+            seconds = [leg.attempt.planning_seconds, retrieval if used_memory else math.nan]
         cells = [
             *(f"{number}", leg.source),
             *(decimal(figure, 1) for figure in figures),

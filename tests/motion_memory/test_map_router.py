@@ -71,6 +71,26 @@ def test_a_map_is_asked_again_and_answers_as_the_command_does(
     assert abs(math.remainder(other.plan.states[-1, 2] - pose[2], math.tau)) <= 0.05
 
 
+def test_who_asks_again_while_driving_never_arrives_later(
+    world: motion_memory.OccupancyMap, router: Any
+) -> None:
+    goals = [world.pose(60.0, 80.0, 0.0)[:2], world.pose(8.0, 90.0, 1.5)]
+    first = router.route(world.pose(*POSE), goals)
+    plan = first.plan
+    stop = int(np.hypot(*(plan.states[:, :2] - goals[0]).T).argmin())
+    for at, left in ((0, goals), (stop // 2, goals), (stop + 20, goals[1:]), (len(plan.controls), goals[1:])):
+        pose, motion = plan.states[at, :3].tolist(), plan.states[at, 3:].tolist()
+        answer = router.route(pose, left, start_motion=motion, current=plan)
+        assert answer.plan.duration_s <= plan.duration_s - at * plan.dt + 1e-9
+        hurried = router.route(pose, left, start_motion=motion, current=plan, time_limit=1e-9)
+        assert hurried.source == "kept" or at == len(plan.controls)  # where nothing is left to drive
+        np.testing.assert_allclose(hurried.plan.states, plan.states[at:], atol=1e-6)
+    elsewhere = router.route(world.pose(60.0, 6.0, 0.0), goals[1:], current=plan)
+    assert elsewhere.source == "searched"
+    with pytest.raises(ValueError, match="current"):
+        router.route(world.pose(*POSE), goals, current=replace(plan, states=plan.states[:, :4]))
+
+
 def test_a_route_teaches_what_the_command_learns_of_it_and_nothing_twice(
     file: Path, world: motion_memory.OccupancyMap, alone: motion_memory.Memory, router: Any, tmp_path: Path
 ) -> None:

@@ -21,6 +21,7 @@ SECTIONS: Final = {
     "unlike_vehicles": "tests.speed.unlike_vehicles",
     "driving_costs": "tests.speed.driving_costs",
     "tight_doors": "tests.speed.tight_doors",
+    "again_while_driving": "tests.speed.again_while_driving",
     "manoeuvres": "tests.speed.manoeuvres",
     "kin": "tests.speed.kin",
     "peers": "tests.speed.peers.comparison",

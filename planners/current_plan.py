@@ -1,0 +1,97 @@
+"""What is left of the plan that a robot drives now, from where the robot is.
+
+Each search begins anew. Half-way through a drive it may find one of a worse kind than the robot is driving,
+so a robot that plans again and again would arrive later than it was promised, and change its mind. What is
+left of its plan is an answer, too, and only a cheaper one replaces it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.polish import polish_guesses
+from planners.search.braking import is_free_drive
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
+from planners.world.goal import goal_of
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import Vehicle, state_size
+from planners.world.workspace import Workspace
+
+OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and shares of full speed together
+SAME: Final = 1e-6  # metres, m/s and radians: who is off by no more drives the same controls on
+
+
+def rest_of(
+    current: Plan, problem: Problem, vehicle: Vehicle, scene: Scene, workspace: Workspace, until: float
+) -> Plan | None:
+    """Drive what is left of a plan, from the start of a problem.
+
+    A robot on its plan drives the same controls on. For one that is beside it, as a measured state is, whose
+    plan an obstacle touches now, or whose goal has moved, a free drive near the plan is looked for.
+
+    Args:
+        current: the plan, in the problem's frame and lengths.
+        problem: where the robot is, and where it has to go.
+        vehicle: what is driven.
+        scene: ``scene_of(problem)``.
+        workspace: the caller's buffers.
+        until: when to give up, by ``working_clock``.
+
+    Returns:
+        A plan for the problem; None if the robot is not near its plan, or no drive near what is left of it is
+        free and leads to the goal.
+    """
+    start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
+    off = _off(current.states, start, vehicle)
+    nearest = len(off) - 1 - int(off[::-1].argmin())  # the last of those where it stands
+    if off[nearest] > OFF:
+        return None
+    controls = current.controls[nearest:]
+    states = simulate(start, controls, vehicle)
+    if np.abs(states[0] - _turned_to(current.states[nearest], start)).max() <= SAME:
+        steps = int(steps_to_goal(states, len(controls), goal, vehicle))
+        if steps >= 0 and is_free_drive(states[: steps + 1], vehicle, scene):
+            return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
+    if len(controls) == 0:
+        return None
+    guess = Plan(states, controls, vehicle.dt)
+    return polish_guesses(problem, [guess], vehicle, scene, workspace, until)[1].plan
+
+
+def fits(current: Plan, vehicle: Vehicle) -> bool:
+    """Whether states and steps of a plan are those of a vehicle."""
+    states = np.asarray(current.states)
+    return (
+        current.dt == vehicle.dt
+        and states.ndim == 2
+        and states.shape[1] == state_size(vehicle)
+        and np.shape(current.controls) == (len(states) - 1, 2)
+    )
+
+
+def _off(states: Floats, state: Floats, vehicle: Vehicle) -> Floats:
+    """How far each of ``states [T, S]`` is from a state ``[S]``: lengths, radians, shares of full speed."""
+    away = np.hypot(*(states[:, :2] - state[:2]).T) / (vehicle.front + vehicle.rear)
+    turned = np.abs(_wrapped(states[:, 2] - state[2]))
+    others = np.abs(states[:, 4:] - state[4:]).sum(axis=1)
+    faster = np.abs(states[:, 3] - state[3]) / vehicle.max_speed
+    off: Floats = away + turned + faster + others
+    return off
+
+
+def _turned_to(state: Floats, other: Floats) -> Floats:
+    """A state ``[S]`` with its heading written as that of another, whole turns apart or not."""
+    turned = state.copy()
+    turned[2] = other[2] + _wrapped(state[2] - other[2])
+    return turned
+
+
+def _wrapped(angles: Floats) -> Floats:
+    wrapped: Floats = np.remainder(angles + math.pi, math.tau) - math.pi
+    return wrapped

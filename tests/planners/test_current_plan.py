@@ -1,0 +1,137 @@
+"""Who plans again while driving is given what is left of its plan, unless another is quicker."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.current_plan import fits, rest_of
+from planners.search.query import Limits
+from planners.solve import solve
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Arrival, Plan, Problem, obstacles_of
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.workspace import Workspace
+from tests.worlds import box
+
+PLACE = Problem(
+    "rooms",
+    "rooms",
+    (2.0, 4.0, 0.4),
+    (26.0, 12.0),
+    0.5,
+    (-4.0, -4.0, 32.0, 20.0),
+    obstacles_of([[box(9.2, 1.5, 0.0, 0.2, 5.5)], [box(9.2, 14.75, 0.0, 0.2, 5.25)]]),
+)
+POSE = replace(PLACE, goal_radius=0.1, arrival=Arrival(1.2, 0.05, 0.0, 0.0))
+WORKSPACE = Workspace()
+FEW = Limits(expansions=8_000)
+
+
+def first_plan(problem: Problem, vehicle: Vehicle) -> Plan:
+    plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+    assert plan is not None
+    return plan
+
+
+PLANS = {
+    (kind, vehicle): first_plan(problem, vehicle)
+    for kind, problem in (("place", PLACE), ("pose", POSE))
+    for vehicle in (CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER)
+}
+ASKED = {"place": PLACE, "pose": POSE}
+CASES = st.sampled_from(list(PLANS))
+
+
+def seen_from(state: np.ndarray, problem: Problem) -> Problem:
+    x, y, heading, *motion = state.tolist()
+    return replace(problem, start=(x, y, heading), start_motion=tuple(motion))
+
+
+@settings(deadline=None, max_examples=12)
+@given(CASES, st.floats(0.0, 1.0), st.sampled_from([-math.tau, 0.0, math.tau]))
+def test_planning_again_never_arrives_later(case: tuple[str, Vehicle], share: float, turn: float) -> None:
+    (kind, vehicle), plan = case, PLANS[case]
+    at = int(share * (len(plan.states) - 1))
+    state = plan.states[at].copy()
+    state[2] += turn  # a measured heading knows no whole turns
+    problem = seen_from(state, ASKED[kind])
+    answer = solve(problem, "lattice", vehicle=vehicle, limits=FEW, workspace=WORKSPACE, current=plan)
+    assert answer.plan is not None
+    assert faults(problem, answer.plan, vehicle) == []
+    left = plan.dt * (len(plan.controls) - at)
+    assert answer.plan.duration_s <= left + 1e-9
+    assert answer.source in ("kept", "searched")
+
+
+@settings(deadline=None, max_examples=12)
+@given(CASES, st.floats(0.0, 0.8), st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-0.02, 0.02))
+def test_beside_its_plan_a_robot_drives_near_it(
+    case: tuple[str, Vehicle], share: float, x: float, y: float, turn: float
+) -> None:
+    (kind, vehicle), plan = case, PLANS[case]
+    at = int(share * (len(plan.states) - 1))
+    state = plan.states[at].copy()
+    state[:3] += (x, y, turn)
+    problem = seen_from(state, ASKED[kind])
+    rest = rest_of(plan, problem, vehicle, scene_of(problem), WORKSPACE, math.inf)
+    if rest is not None:  # a step before a wall there may be no way on
+        assert faults(problem, rest, vehicle) == []
+        assert rest.duration_s <= plan.dt * (len(plan.controls) - at) + 1.0
+    else:
+        assert kind == "pose" or solve(problem, "lattice", vehicle=vehicle, current=plan).source != "kept"
+
+
+def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> None:
+    rng, plan = np.random.default_rng(3), PLANS["place", CAR]
+    found = 0
+    for at in range(0, len(plan.states) - 1, 5):
+        state = plan.states[at].copy()
+        state[:3] += 0.01 * rng.normal(size=3)
+        problem = seen_from(state, PLACE)
+        found += rest_of(plan, problem, CAR, scene_of(problem), WORKSPACE, math.inf) is not None
+    assert found >= 0.8 * len(range(0, len(plan.states) - 1, 5))
+
+
+@pytest.mark.parametrize("kind", ["place", "pose"])
+def test_a_blocked_plan_is_left(kind: str) -> None:
+    plan = PLANS[kind, CAR]
+    at = len(plan.states) // 4
+    x, y = plan.states[3 * len(plan.states) // 4, :2].tolist()
+    problem = seen_from(plan.states[at], ASKED[kind])
+    across = box(x, y, 0.0, 0.5, 0.5)
+    walls = [[piece] for piece in PLACE.obstacles.pieces()]
+    problem = replace(problem, obstacles=obstacles_of([*walls, [across]]))
+    assert faults(problem, Plan(plan.states[at:], plan.controls[at:]))
+    answer = solve(problem, "lattice", workspace=WORKSPACE, current=plan)
+    assert answer.plan is not None
+    assert faults(problem, answer.plan) == []
+
+
+def test_who_is_elsewhere_has_no_plan_left() -> None:
+    plan = PLANS["pose", CAR]
+    elsewhere = seen_from(np.array([28.0, 0.0, 0.0, 0.0, 0.0]), POSE)
+    assert rest_of(plan, elsewhere, CAR, scene_of(elsewhere), WORKSPACE, math.inf) is None
+
+
+def test_a_goal_may_move_meanwhile() -> None:
+    plan = PLANS["pose", CAR]
+    at = len(plan.states) // 2
+    problem = replace(seen_from(plan.states[at], POSE), goal=(26.0, 11.0))
+    rest = rest_of(plan, problem, CAR, scene_of(problem), WORKSPACE, math.inf)
+    assert rest is not None
+    assert faults(problem, rest) == []
+
+
+def test_a_plan_fits_the_vehicle_that_drives_it() -> None:
+    plan = PLANS["place", CAR_1_TRAILER]
+    assert fits(plan, CAR_1_TRAILER)
+    assert not fits(plan, CAR)
+    assert not fits(replace(plan, dt=0.5 * plan.dt), CAR_1_TRAILER)
+    assert not fits(replace(plan, controls=plan.controls[1:]), CAR_1_TRAILER)
