@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -17,7 +18,7 @@ from planners.world.problem import Arrival, Problem, begins_straight, is_canonic
 from planners.world.vehicles.vehicle import Vehicle
 from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_data_folder
-from storage.places.mirror import local_place
+from storage.places.mirror import local_place, remove
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import add_gained, gained_shards, snapshot_path, take_snapshot
 from storage.vehicles.vehicle_files import label_of, said_vehicle
@@ -113,6 +114,22 @@ def snapshot_of_questions(data: Path | str, vehicle: Vehicle, name: str) -> Path
             "first, or name the vehicle that did."
         )
     return snapshot_path(folder, take_snapshot(folder, name, vehicle))
+
+
+@contextmanager
+def removed_if_it_fails(snapshot: Path) -> Iterator[None]:
+    """Remove a snapshot if the work with it raises an error: the next try is with what was learned by then.
+
+    Work that is killed or interrupted leaves it, so that the same command goes on with it.
+
+    Args:
+        snapshot: the file of a snapshot that nothing rests on yet.
+    """
+    try:
+        yield
+    except Exception:
+        remove(snapshot)
+        raise
 
 
 def has_gained(data: Path) -> bool:

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import logging
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from dashboards.cells import CellTable, as_markdown
 from dashboards.verdicts.drift import FEWEST
-from dashboards.verdicts.promotion import judgement_line, judgement_markdown, judgement_tables
+from dashboards.verdicts.promotion import Judgement, judgement_line, judgement_markdown, judgement_tables
 from storage.places.data_folder import DataFolder
+from storage.places.mirror import remove
 from storage.places.scratch import scratch_folder
 from storage.tables.gained_experiences import gained_shards
 from storage.vehicles.vehicle_files import label_of
 from tasks.champions.conclude import benchmark_tag, settle, summary_of, verdict_on
 from tasks.champions.new_experience import note_verdict
 from tasks.fan_out.keys import key_of
-from tasks.inputs.gained_on_the_job import snapshot_of_questions
+from tasks.inputs.gained_on_the_job import removed_if_it_fails, snapshot_of_questions
 from tasks.libraries.challenger import LEARNED, make_challenger
 from tasks.libraries.judge_library import (
     CHALLENGER,
@@ -65,7 +67,7 @@ class RetrainedLibrary(NamedTuple):
     tables: Sequence[CellTable]  # of the judgement
 
 
-class _Challenger(NamedTuple):
+class _Made(NamedTuple):
     title: str
     folder: Path
     counts: Sequence[SourceCounts]
@@ -118,16 +120,64 @@ def _retrained(
     workers: int,
     flow: GatherFlow | None,
 ) -> RetrainedLibrary | None:
-    vehicle, number = asked.settings.vehicle, pending.number
-    snapshot = None
-    if gained_shards(folder.gained_questions(label_of(vehicle))):
-        snapshot = snapshot_of_questions(folder.place, vehicle, f"{asked.name}-{number:04d}")
-    learned = "" if snapshot is None else snapshot.stem
-    before = pending.champion
+    with _learned(folder, asked, registry, pending.number) as snapshot:
+        made = _challenger(folder, asked, registry, pending, snapshot, workers, flow)
+    if made is None:
+        if snapshot is not None:
+            remove(snapshot)
+        return None
+    judgement = made.judgement
+    ours = None if judgement is None else judgement.champion
+    version, verdict, markdown = _registered(folder, asked, registry, pending, made)
+    summary = summary_of(version, pending.champion, verdict, ours)
+    if verdict == REFUSED and pending.champion is None:
+        summary = f"{version.name} version {version.number} is {verdict}: {HARM}"
+    faults = settle(registry, [(version, verdict)])
+    if flow is not None:
+        publish_judgements(made.title, [(asked.name, summary, markdown)])
+    if faults:
+        raise RunError(" ".join(faults))
+    if judgement is None:
+        return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, "", [])
+    if verdict != REFUSED:
+        _warn_of_harm(made.title, judgement.alone)
+    tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
+    return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, _beside(judgement), tables)
+
+
+@contextmanager
+def _learned(
+    folder: DataFolder, asked: LibraryRetraining, registry: Registry, number: int
+) -> Iterator[Path | None]:
+    """A snapshot of what was learned, which stays if the work with it is done or killed; None of nothing.
+
+    If the work raises an error, the snapshot is removed, unless a version was made of it before.
+    """
+    vehicle = asked.settings.vehicle
+    if not gained_shards(folder.gained_questions(label_of(vehicle))):
+        yield None
+        return
+    used = {version.tag("learned") for version in registry.versions(asked.registered)}
+    snapshot = snapshot_of_questions(folder.place, vehicle, f"{asked.name}-{number:04d}")
+    with nullcontext() if snapshot.stem in used else removed_if_it_fails(snapshot):
+        yield snapshot
+
+
+def _challenger(
+    folder: DataFolder,
+    asked: LibraryRetraining,
+    registry: Registry,
+    pending: PendingLibrary,
+    snapshot: Path | None,
+    workers: int,
+    flow: GatherFlow | None,
+) -> _Made | None:
+    """Gather and judge a library; None if the champion answers everything."""
+    before, learned = pending.champion, "" if snapshot is None else snapshot.stem
     made_of = key_of(asked.recipe(), learned, "" if before is None else before.number)
-    title = f"{asked.name}-{number:04d}-{made_of[:6]}"
+    title = f"{asked.name}-{pending.number:04d}-{made_of[:6]}"
     out = folder.libraries / title
-    questions = _held_back(asked, snapshot, number, out, before is None)
+    questions = _held_back(asked, snapshot, pending.number, out, before is None)
     with scratch_folder() as scratch:
         champion = None if before is None else registry.fetch(before, str(scratch))
         begun = None if pending.is_anew else champion
@@ -135,26 +185,14 @@ def _retrained(
         if not counts:
             _LOG.info("%s: the champion answers all questions that were learned", asked.name)
             return None
-        judgement = _judged(folder, questions, champion, out)
-    made = _Challenger(title, out, counts, learned, judgement)
-    version, verdict, markdown = _registered(folder, asked, registry, pending, made)
-    ours = None if judgement is None else judgement.champion
-    summary = summary_of(version, before, verdict, ours)
-    if verdict == REFUSED and before is None:
-        summary = f"{version.name} version {version.number} is {verdict}: {HARM}"
-    faults = settle(registry, [(version, verdict)])
-    if flow is not None:
-        publish_judgements(title, [(asked.name, summary, markdown)])
-    if faults:
-        raise RunError(" ".join(faults))
-    if judgement is None:
-        return RetrainedLibrary(out, counts, version, verdict, summary, "", [])
-    if verdict != REFUSED and judgement.alone.high_s < 0.0:
-        count = judgement.alone.problems
-        few = f"; {count} questions are too few to refuse it, {FEWEST} would do" if count < FEWEST else ""
-        _LOG.warning("%s: %s%s.", title, HARM, few)
-    tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
-    return RetrainedLibrary(out, counts, version, verdict, summary, _beside(judgement), tables)
+        return _Made(title, out, counts, learned, _judged(folder, questions, champion, out))
+
+
+def _warn_of_harm(title: str, alone: Judgement) -> None:
+    """Warn if robots are later with a library than without one, though it was not refused."""
+    if alone.high_s < 0.0:
+        few = f"; {alone.problems} questions are too few to refuse it, {FEWEST} would do"
+        _LOG.warning("%s: %s%s.", title, HARM, few if alone.problems < FEWEST else "")
 
 
 def _registered(
@@ -162,7 +200,7 @@ def _registered(
     asked: LibraryRetraining,
     registry: Registry,
     pending: PendingLibrary,
-    made: _Challenger,
+    made: _Made,
 ) -> tuple[Version, str, str]:
     """Log a library and the judgement in MLflow, and register it: the version, the verdict, and its text."""
     ours = None if made.judgement is None else made.judgement.champion
@@ -246,7 +284,7 @@ def _judged(
     return judge_library(Judging(out, questions, tuple(sides)))
 
 
-def _markdown(made: _Challenger, verdict: str) -> str:
+def _markdown(made: _Made, verdict: str) -> str:
     judgement = made.judgement
     parts = [f"Library *{made.title}*, learned: `{made.learned or 'nothing'}`."]
     if verdict == FIRST:

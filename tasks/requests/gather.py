@@ -6,7 +6,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
@@ -24,7 +24,7 @@ from storage.places.mirror import remove
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
 from tasks.fan_out.keys import digest_of
-from tasks.inputs.gained_on_the_job import snapshot_of_questions
+from tasks.inputs.gained_on_the_job import removed_if_it_fails, snapshot_of_questions
 from tasks.requests.gather_pieces import (
     GATHER,
     Gathered,
@@ -129,13 +129,9 @@ def gather(
         counts = [SourceCounts(**each) for each in gathered["sources"]]
     else:
         refuse_existing(out)
-        snapshots = _snapshots(request)
-        request = replace(request, learned={name: str(path) for name, path in snapshots.items()})
-        with answers_of(request, workers, flow) as (answers, counts):
+        with _with_learned(request) as request, answers_of(request, workers, flow) as (answers, counts):
             library = library_of(settings.vehicle, answers)
             save_library(out, library, {"asked": asked, "sources": [each._asdict() for each in counts]})
-        for path in snapshots.values():
-            remove(path)
     warn_if_short(counts, wanted_plans(plans, sources, counts))
     return counts
 
@@ -150,13 +146,22 @@ def wanted_plans(plans: int | None, sources: Sequence[str], counts: Sequence[Sou
     return USUAL if plans is None else plans
 
 
-def _snapshots(request: GatherRequest) -> dict[str, Path]:
-    """What was learned until now in the data folders among the sources; until the library is there."""
-    vehicle = request.settings.vehicle
+@contextmanager
+def _with_learned(request: GatherRequest) -> Iterator[GatherRequest]:
+    """The request with what was learned until now in the data folders among its sources.
+
+    It stays the same for a command that was killed and is repeated, and is removed at the end of all others.
+    """
     name = f"gather-{digest_of(str(request.out.absolute()))[:8]}"
-    return {
-        each: snapshot_of_questions(each, vehicle, name) for each in request.sources if is_data_folder(each)
-    }
+    learned: dict[str, str] = {}
+    with ExitStack() as stack:
+        for each in filter(is_data_folder, request.sources):
+            snapshot = snapshot_of_questions(each, request.settings.vehicle, name)
+            stack.enter_context(removed_if_it_fails(snapshot))
+            learned[each] = str(snapshot)
+        yield replace(request, learned=learned)
+        for path in learned.values():
+            remove(Path(path))
 
 
 def warn_if_short(counts: Sequence[SourceCounts], plans: int) -> None:

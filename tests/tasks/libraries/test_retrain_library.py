@@ -24,10 +24,12 @@ from storage.archives.libraries import load_library
 from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
 from storage.tables.attempts import read_attempts
+from storage.tables.gained_experiences import snapshots
+from storage.vehicles.vehicle_files import label_of
 from storage.worlds.importing import ImportSettings
 from tasks.champions.drift_watch import LIBRARY, benchmarked_memory
 from tasks.champions.promote import roll_back
-from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import DIGITS, Solved, question_digest, remember
 from tasks.libraries import judge_library as judging
 from tasks.libraries import retrain_library as task
 from tasks.libraries.judge_library import ALL, ALONE, CHALLENGER, CHAMPION, FEWEST, OTHERS, judged
@@ -64,6 +66,12 @@ def _learn(data: Path, seed: int, count: int) -> list[str]:
     drawn = [to_canonical(family("parallel").draw(seed, index))[0] for index in range(count)]
     remember(data, [Solved(each, solve(each, "lattice")) for each in drawn], CAR)
     return [each.id for each in drawn]
+
+
+def _to_learn_from(seed: int, count: int) -> set[str]:
+    """The names in a library of what is not held back of that which ``_learn`` learned."""
+    drawn = [to_canonical(family("parallel").draw(seed, index))[0] for index in range(count)]
+    return {f"{each.class_name}-{question_digest(each)[:DIGITS]}" for each in drawn if not is_held_back(each)}
 
 
 def _versions(data: Path) -> list[Version]:
@@ -276,6 +284,42 @@ def test_two_questions_of_a_champion_decide_nothing(data: Path, monkeypatch: pyt
         task.retrain_library(data, few)
     assert [each.name.split("-")[1] for each in (data / "libraries").iterdir()] == ["0001"]
     assert _champion(data) == 1
+
+
+@pytest.mark.parametrize("end", [RunError, KeyboardInterrupt])
+def test_a_retraining_that_failed_sees_what_was_learned_since_and_a_killed_one_goes_on(
+    data: Path, monkeypatch: pytest.MonkeyPatch, end: type[BaseException]
+) -> None:
+    def stop(*_: Any) -> None:
+        raise end
+
+    asked = ASKED._replace(sources=())
+    _learn(data, 6, 4)  # of which two are held back
+    with monkeypatch.context() as stopped:
+        stopped.setattr(task, "judge_library", stop)
+        with pytest.raises(end):
+            task.retrain_library(data, asked)
+    _learn(data, 5, 4)
+    made = _retrain(data, asked)
+    begun, since = _to_learn_from(6, 4), _to_learn_from(5, 4)
+    assert set(load_library(made.folder).questions) == (begun if end is KeyboardInterrupt else begun | since)
+
+
+def test_too_few_questions_to_judge_by_are_enough_once_more_were_learned(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _timed(monkeypatch, _sooner)
+    asked = ASKED._replace(sources=(), test_problems=200)
+    _learn(data, 5, 2)
+    _retrain(data, asked)
+    _learn(data, 6, 2)
+    with pytest.raises(RunError, match="a verdict needs 4"):
+        task.retrain_library(data, asked)
+    _learn(data, 7, 16)
+    second = _retrain(data, asked)
+    assert _to_learn_from(7, 16) < set(load_library(second.folder).questions)
+    taken = {each.stem for each in snapshots(open_data_folder(data).gained(label_of(CAR)))}
+    assert taken == {each.tag("learned") for each in _versions(data)}  # what libraries are made of stays
 
 
 def test_a_question_that_was_learned_judges_under_whatever_name_it_is_asked(tmp_path: Path) -> None:

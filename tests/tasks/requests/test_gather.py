@@ -22,6 +22,7 @@ from storage.archives.libraries import load_library
 from storage.errors import StorageError
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
+from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests import gather, part_folder
 from tasks.requests import gather_pieces as pieces
 from tasks.requests.question_sources import question_source
@@ -126,6 +127,32 @@ def test_what_was_learned_at_work_is_gathered(
     assert call(gathering) == 0
     assert load_library(Path("data/libraries/slots")).questions == library.questions
     assert call(["verify", "data"]) == 0
+
+
+@pytest.mark.parametrize("end", [RunError, KeyboardInterrupt])
+def test_gathering_that_failed_sees_what_was_learned_since_and_a_killed_one_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: type[BaseException]
+) -> None:
+    def learn(number: int) -> None:
+        question = to_canonical(family("perpendicular").draw(11, number))[0]
+        remember(tmp_path / "data", [Solved(question, solve(question, "lattice", seed=1))], CAR)
+
+    def gathered() -> int:
+        sources = [str(tmp_path / "data")]
+        counts = gather.gather(sources, tmp_path / "slots", None, 0.0, "standard", ImportSettings())
+        return sum(each.answered for each in counts)
+
+    def stop(*_: object) -> None:
+        raise end
+
+    learn(15)
+    with monkeypatch.context() as stopped:
+        stopped.setattr(gather, "library_of", stop)
+        with pytest.raises(end):
+            gathered()
+    learn(16)
+    assert gathered() == (1 if end is KeyboardInterrupt else 2)
+    assert not list((tmp_path / "data").rglob("snapshots/*.parquet"))
 
 
 def test_a_question_that_the_search_does_not_answer_keeps_the_plan_that_is_known(
