@@ -23,6 +23,7 @@ from tasks.requests.gather import (
     warn_if_short,
 )
 from tasks.requests.question_sources import is_held_back
+from tasks.settings.errors import RunError
 
 LEARNED: Final = "learned"  # the name of a source
 
@@ -51,7 +52,7 @@ def make_challenger(
         what came of each source; nothing, and nothing is written, if the champion has all there is.
 
     Raises:
-        RunError: no question could be answered.
+        RunError: no question could be answered, or all are held back to judge by.
         StorageError: a source, the champion, or what an earlier command wrote to ``out`` cannot be read.
     """
     vehicle = asked.settings.vehicle
@@ -62,6 +63,11 @@ def make_challenger(
     known = set() if old is None else set(old.questions)
     questions = [] if learned is None else [each.problem for each in read_experiences(learned, vehicle)]
     rows = [row for row, each in enumerate(questions) if each.id not in known and not is_held_back(each)]
+    if old is None and not asked.sources and not rows:
+        raise RunError(
+            f"{asked.name}: all {len(questions)} learned questions are held back to judge by; solve more "
+            "with --learn, or name a class, a family, a map or worlds."
+        )
     libraries, counts = ([], []) if old is None else ([old], [_counts_of(old)])
     new = out.with_name(f"{out.name}-new.parquet")
     with ExitStack() as stack:

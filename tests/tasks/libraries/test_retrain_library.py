@@ -322,6 +322,15 @@ def test_too_few_questions_to_judge_by_are_enough_once_more_were_learned(
     assert taken == {each.tag("learned") for each in _versions(data)}  # what libraries are made of stays
 
 
+def test_where_all_that_was_learned_is_held_back_it_is_told(data: Path) -> None:
+    drawn = [to_canonical(family("parallel").draw(6, index))[0] for index in range(4)]
+    held_back = [each for each in drawn if is_held_back(each)]
+    assert remember(data, [Solved(each, solve(each, "lattice")) for each in held_back], CAR) == len(held_back)
+    with pytest.raises(RunError):
+        task.retrain_library(data, ASKED._replace(sources=()))
+    assert not _versions(data)
+
+
 def test_a_question_that_was_learned_judges_under_whatever_name_it_is_asked(tmp_path: Path) -> None:
     asked = [family("parallel").draw(5, index) for index in range(40)]
     renamed = [replace(to_canonical(each)[0], id=f"job-{number}") for number, each in enumerate(asked)]
