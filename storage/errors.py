@@ -7,6 +7,18 @@ class StorageError(Exception):
     """Something on disk is missing, damaged, foreign or cannot be written."""
 
 
+class DamagedError(StorageError):
+    """A file on disk is damaged: how, and what to do."""
+
+    def __init__(self, fault: str, remedy: str) -> None:
+        super().__init__(fault, remedy)  # both, so that it can be sent from one process to another
+        self.fault = fault
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.fault}; {self.remedy}"
+
+
 class UnreachableError(StorageError):
     """Object storage does not answer now, or answers with errors that may be temporary."""
 

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty, PlannerName, SourceName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
-from flows.cli.terminal import write, write_answer, write_files, write_for_people, write_learned
+from flows.cli.terminal import SHORT, write, write_answer, write_files, write_for_people, write_learned
 
 if TYPE_CHECKING:
     from tasks.requests.problem_parts import PartResult, SolveRequest
@@ -157,7 +157,7 @@ def solve(
     learn: Path | None = None,
     workers: int | None = None,
     options: SolveOptions = _USUAL,
-) -> None:
+) -> int:
     """Solve many problems, and write one row each. A repeated command continues where it stopped.
 
     Args:
@@ -183,6 +183,7 @@ def solve(
     write_files(rows=out, plans=plans, picture=picture)
     write_learned(learn, solved.learned)
     write(*(f"watched  {line}" for line in solved.drift))
+    return SHORT if solved.unlearned else 0
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

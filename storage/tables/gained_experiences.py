@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -21,7 +21,7 @@ import pyarrow as pa
 
 from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import Vehicle
-from storage.errors import InUseError, StorageError
+from storage.errors import DamagedError, InUseError, StorageError
 from storage.places.data_folder import QUESTIONS
 from storage.places.files import locked
 from storage.places.mirror import files_in, remove
@@ -40,6 +40,7 @@ SHARDS: Final = 16  # if there are more, they are merged
 SNAPSHOTS: Final = "snapshots"
 DIGITS: Final = 8  # of a snapshot's digest
 MERGE_SECONDS: Final = 60.0  # at most: merging what is kept takes some seconds
+LOST: Final = "put back a copy of it, or move it away and solve what it held again with --learn."
 READINGS: Final = 3  # attempts to read shards that others may merge
 
 
@@ -54,6 +55,8 @@ def add_gained(
 ) -> None:
     """Add ``experiences`` of one ``vehicle`` to a ``folder``, all or none; adding them again changes nothing.
 
+    They are added before shards are merged, so an error of a damaged shard does not mean that they are not.
+
     Args:
         folder: folder of experiences that were gained.
         experiences: ``[n]``, all of the vehicle.
@@ -61,6 +64,9 @@ def add_gained(
         seeds: ``[n]``, the seed of each search.
         planning_seconds: ``[n]``, what each search took.
         vehicle: the vehicle that drives them.
+
+    Raises:
+        StorageError: they cannot be written, or too many shards are to be merged and one is damaged.
     """
     marks = [
         _mark(each.problem.id, each.plan.states.tobytes() + each.plan.controls.tobytes())
@@ -133,8 +139,19 @@ def read_gained(folder: Path, vehicle: Vehicle) -> list[SearchedExperience]:
 
 
 def _searched(folder: Path, vehicle: Vehicle) -> list[SearchedExperience]:
-    with sound(folder):
-        return searched_of(_kept(folder, vehicle)[1], vehicle)
+    table = _kept(folder, vehicle)[1]
+    with sound_or_lost(folder):
+        return searched_of(table, vehicle)
+
+
+@contextmanager
+def sound_or_lost(path: Path) -> Iterator[None]:
+    """Like ``sound``, for what was learned: no command makes it again, and a merged shard holds all of it."""
+    try:
+        with sound(path):
+            yield
+    except DamagedError as error:
+        raise DamagedError(error.fault, LOST) from None
 
 
 def rows_of_class(snapshot: Path, class_name: str) -> list[int]:
@@ -159,7 +176,10 @@ def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
     shards = gained_shards(folder)
     if not shards:
         return [], EXPERIENCES.empty_table(), ""
-    tables = [read_experience_table(shard, vehicle) for shard in shards]
+    tables = []
+    for shard in shards:
+        with sound_or_lost(shard):
+            tables.append(read_experience_table(shard, vehicle))
     table = pa.concat_tables(tables, promote_options="default")  # earlier versions had fewer columns
     plans = [
         states.tobytes() + controls.tobytes()

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from storage.errors import StorageError
+from storage.errors import DamagedError, StorageError
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
 from storage.tables.earlier_versions import EARLIER, RENAMED
@@ -102,13 +102,13 @@ def _renamed(table: pa.Table) -> pa.Table:
 
 @contextmanager
 def sound(path: Path) -> Iterator[None]:
-    """Raise StorageError instead of any error that unsound rows in the file at ``path`` raise."""
+    """Raise DamagedError instead of any error that unsound rows in the file at ``path`` raise."""
     try:
         yield
     except (pa.ArrowException, OSError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise StorageError(
-            f"{path} is not a complete Parquet file of its kind ({_first_line(error)}); delete it and run "
-            "its stage again."
+        raise DamagedError(
+            f"{path} is not a complete Parquet file of its kind ({_first_line(error)})",
+            "delete it and run its stage again.",
         ) from None
 
 

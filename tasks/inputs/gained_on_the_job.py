@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -49,6 +49,9 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
 
     Returns:
         how many plans no memory had; of one that is there already nothing more is kept.
+
+    Raises:
+        StorageError: some cannot be written, or there are many shards and one of them is damaged.
     """
     straight: list[tuple[Experience, Attempt]] = []
     questions: list[tuple[Experience, Attempt]] = []
@@ -64,16 +67,18 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
             questions.append((Experience(named, attempt.plan, vehicle), attempt))
     label = label_of(vehicle)
     folder = open_data_folder(data)
-    for place, new in ((folder.gained(label), straight), (folder.gained_questions(label), questions)):
-        if new:
-            add_gained(
-                place,
-                [experience for experience, _ in new],
-                planners=[attempt.planner for _, attempt in new],
-                seeds=[attempt.seed for _, attempt in new],
-                planning_seconds=[attempt.planning_seconds for _, attempt in new],
-                vehicle=vehicle,
-            )
+    with ExitStack() as stack:  # neither is kept from being learned by what befalls the other
+        for place, new in ((folder.gained_questions(label), questions), (folder.gained(label), straight)):
+            if new:
+                stack.callback(
+                    add_gained,
+                    place,
+                    [experience for experience, _ in new],
+                    planners=[attempt.planner for _, attempt in new],
+                    seeds=[attempt.seed for _, attempt in new],
+                    planning_seconds=[attempt.planning_seconds for _, attempt in new],
+                    vehicle=vehicle,
+                )
     return len(straight) + len(questions)
 
 

@@ -94,6 +94,7 @@ class PartResult(NamedTuple):
 
     faults: list[str]  # where malformed problems are, and what is wrong; if there are any, nothing is solved
     learned: int = 0  # plans that no memory had, if they are kept
+    unlearned: str = ""  # why some may not be kept
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:
@@ -144,14 +145,18 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
     rows = chunk.rows_begun()
     before = len(rows)
     solved: list[Solved] = []
-    learned = 0
+    learned, unlearned = 0, ""
 
     def keep(path: Path) -> None:
-        nonlocal learned
-        if request.learn is not None:
-            learned += remember(request.learn, solved, assistant.vehicle)
+        nonlocal learned, unlearned
+        try:  # before there are rows: who is killed in between learns again, which changes nothing
+            if request.learn is not None:
+                learned += remember(request.learn, solved, assistant.vehicle)
+        except (StorageError, OSError) as error:
+            unlearned = str(error)
+        finally:
             solved.clear()
-        write_attempts(path, rows, key=chunk.key)
+            write_attempts(path, rows, key=chunk.key)
 
     read = list(problems_or_faults_of(chunk.problem_slice, assistant.vehicle))
     problems = [problem for _, problem in read if not isinstance(problem, str)]
@@ -183,7 +188,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 gc.collect()
     keep(chunk.shard)
     chunk.begun.unlink(missing_ok=True)
-    return PartResult([], learned)
+    return PartResult([], learned, unlearned)
 
 
 @contextmanager

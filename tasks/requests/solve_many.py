@@ -64,7 +64,10 @@ class SolvedMany(NamedTuple):
     solved_now: int  # problems that were attempted by this command; an earlier one attempted the others
     seconds: float  # that these took
     drift: Sequence[str]  # lines that compare the memory with its benchmark
-    learned: int | None  # plans that no memory had, of the problems attempted by this command, if any were
+    # plans that no memory had, of the problems attempted by this command; None if there are none, or if
+    # learning failed
+    learned: int | None
+    unlearned: str = ""  # why learning failed, if it did
 
     @property
     def planning_seconds(self) -> tuple[float, float, float]:
@@ -161,8 +164,16 @@ def solve_many(
             remove_parts(out)
         _draw(parts, assistant, drawing)
     solved_now = sum(part.problem_slice.count for part in left) - begun
-    learned = sum(result.learned for result in results)
-    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request), learned)
+    learned: int | None = sum(result.learned for result in results)
+    unlearned = next((result.unlearned for result in results if result.unlearned), "")
+    if unlearned:
+        learned = None
+        _LOG.warning(
+            "All answers are written, but not all may be learned: %s Then solve the problems again, with "
+            "another --out.",
+            unlearned,
+        )
+    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request), learned, unlearned)
 
 
 def _draw(parts: Sequence[FilePart], assistant: Assistant, drawing: Path | None) -> None:

@@ -34,7 +34,7 @@ from storage.places.mirror import files_in, folders_in, is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences, vehicle_of_experiences
-from storage.tables.gained_experiences import all_gained_shards, snapshots
+from storage.tables.gained_experiences import all_gained_shards, snapshots, sound_or_lost
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
 from storage.vehicles.vehicle_files import said_vehicle
@@ -74,7 +74,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
     for gained in data.gained_folders():
         own = [*all_gained_shards(gained), *snapshots(gained)]
-        checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in own]
+        checks += [partial(_gained, path, VEHICLES.get(gained.name)) for path in own]
     checks += [partial(_answers, path) for path in files_in(data.judged_libraries, "[!.]*.parquet")]
     checks += [
         partial(_library, path)
@@ -93,8 +93,8 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     if faults_found:
         tell_faults(faults_found)
         raise RunError(
-            f"{len(faults_found)} faults in {folder}; delete the files that are named, and repeat the "
-            "command that made them."
+            f"{len(faults_found)} faults in {folder}; delete the files that are named, but for what was "
+            "learned, and repeat the command that made them."
         )
     return checked
 
@@ -144,6 +144,11 @@ def _experiences(path: Path, vehicle: Vehicle | None) -> Findings:
         for fault in faults(experience.problem, experience.plan, vehicle)
     ]
     return Counter({"plans of experiences re-simulated and checked by FCL": len(experiences)}), wrong
+
+
+def _gained(path: Path, vehicle: Vehicle | None) -> Findings:
+    with sound_or_lost(path):
+        return _experiences(path, vehicle)
 
 
 def _library(folder: Path) -> Findings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +11,17 @@ import pytest
 
 from planners.memory.plans.experience import Experience
 from planners.solve import solve
+from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
+from planners.world.classes.families import family
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Arrival, Problem
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of
+from storage.places.data_folder import open_data_folder
+from storage.tables import gained_experiences
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs.gained_on_the_job import Solved, remember, snapshot_of_questions, with_gained
@@ -162,3 +167,22 @@ def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) ->
     assert remember(tmp_path, again, CAR) == 0
     with pytest.raises(StorageError, match="holds no learned problems"):
         with_gained(SETTINGS, tmp_path, "now")
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_damaged_file_of_one_kind_of_problems_keeps_none_from_being_learned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solved: list[Solved], which: int
+) -> None:
+    monkeypatch.setattr(gained_experiences, "SHARDS", 0)  # they are merged each time
+    slot = to_canonical(family("parallel").draw(5, 0))[0]
+    folder = open_data_folder(tmp_path)
+    folders = (folder.gained("car"), folder.gained_questions("car"))
+    damaged = folders[which] / "damaged.parquet"
+    damaged.parent.mkdir(parents=True)
+    damaged.write_bytes(b"PAR1")
+    with pytest.raises(StorageError, match=str(damaged)) as error:
+        remember(tmp_path, [Solved(slot, solve(slot, "lattice")), *solved], CAR)
+    assert str(pickle.loads(pickle.dumps(error.value))) == str(error.value)  # workers send it
+    damaged.unlink()
+    counts = [len(gained_experiences.read_gained(each, CAR)) for each in folders]
+    assert counts == [len(solved), 1]

@@ -17,13 +17,16 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from flows.cli.main import call
 from planners.attempt import Attempt
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of, write_problems
-from storage.places.data_folder import DataFolder
+from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.files import locked
+from storage.tables import gained_experiences
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.gained_experiences import gained_shards
 from tasks.requests import problem_parts as parts
@@ -314,3 +317,35 @@ def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) ->
         solve_many(ASSISTANT, problems, tmp_path / out, learn=tmp_path / "data")
     shards = gained_shards(DataFolder(tmp_path / "data").gained("car"))
     assert len(shards) == -(-COUNT // SIZE)
+
+
+def test_answers_are_written_where_learning_fails(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: pd.DataFrame
+) -> None:
+    def fail(*_: Any) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(parts, "remember", fail)
+    out = tmp_path / "rows.parquet"
+    solved = solve_many(ASSISTANT, problems, out, learn=tmp_path / "data")
+    assert "No space left" in solved.unlearned
+    assert solved.learned is None
+    equal_but_for_seconds(read_attempts(out), undisturbed)
+
+
+def test_a_damaged_file_of_what_was_learned_is_told_once_and_costs_neither_answers_nor_plans(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(gained_experiences, "SHARDS", 0)  # they are merged each time
+    folder = open_data_folder(tmp_path / "data").gained("car")
+    folder.mkdir(parents=True)
+    (folder / "damaged.parquet").write_bytes(b"PAR1")
+    out = tmp_path / "rows.parquet"
+    command = ["solve", problems, "--planner", "gust", "--out", out, "--learn", tmp_path / "data"]
+    assert call([*map(str, command), "--workers", "1", "--quiet"]) == 3
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert str(folder / "damaged.parquet") in told
+    assert len(read_attempts(out)) == COUNT
+    (folder / "damaged.parquet").unlink()
+    assert len(gained_experiences.read_gained(folder, CAR)) == COUNT
