@@ -8,6 +8,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any, Final, get_args
@@ -25,7 +26,7 @@ from flows.cli import server_commands as serving
 from flows.cli import stage_commands as stages
 from flows.cli.configuration import check_configuration, configuration_file
 from flows.cli.document import Document
-from flows.cli.terminal import notices_shown, telling, write_document, write_error
+from flows.cli.terminal import notices_shown, telling, to_output, write_document, write_error
 from tasks.settings.redaction import redacted
 
 FAILURE: Final = 1
@@ -159,15 +160,28 @@ def _one_line(error: Exception) -> str:
     return redacted(text) or type(error).__name__
 
 
+def _open_closed_streams() -> None:
+    """Open the streams that the caller has closed (``>&-``), before a file is opened under their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115  # as long as the process
+
+
 def main() -> None:
     """Entry point of the console script."""
+    _open_closed_streams()
     signal.signal(signal.SIGINT, _interrupt)
-    try:
-        code = call()
-        sys.stdout.flush()
+    code = FAILURE
+    with suppress(OSError):  # of the error stream: nothing can be told then
+        try:
+            code = call()
+            with to_output():
+                pass  # what others have printed is written
+        except OSError as error:
+            code = FAILURE
+            if not isinstance(error, BrokenPipeError):  # whose reader, such as `head`, wants no more
+                write_error(_one_line(error))
         sys.stderr.flush()
-    except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
-        code = FAILURE
     os._exit(code)  # threads of Prefect and Dask would wait for servers that have already ended
 
 

@@ -54,15 +54,25 @@ def telling() -> Telling:
 
 
 def write(*items: str | CellTable) -> None:
-    """Write lines and tables, the results of a command, to the output."""
-    for item in items:
-        if _telling.document is not None:
-            _telling.document.add(item)
-        elif isinstance(item, str):
-            print(item)
-        else:
-            _draw(item)
-    sys.stdout.flush()
+    """Write lines and tables, the results of a command; raises OSError as ``to_output`` does."""
+    with to_output():
+        for item in items:
+            if _telling.document is not None:
+                _telling.document.add(item)
+            elif isinstance(item, str):
+                print(item)
+            else:
+                _draw(item)
+
+
+@contextmanager
+def to_output() -> Iterator[None]:
+    """Flush the output at the end; raise OSError, which names it, if it cannot be written."""
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "the output") from None
 
 
 def write_answer(*lines: str, **answer: object) -> None:
@@ -113,7 +123,8 @@ def write_error(line: str) -> None:
 def write_document(exit_code: int) -> None:
     """Write the document with everything that was reported to the output, if there is one."""
     if _telling.document is not None:
-        print(_telling.document.text(exit_code), flush=True)
+        with to_output():
+            print(_telling.document.text(exit_code))
 
 
 @contextmanager

@@ -197,3 +197,27 @@ def test_ctrl_c_says_what_becomes_of_the_command_wherever_its_options_stand(
     with pytest.raises(KeyboardInterrupt):
         _interrupt(signal.SIGINT, None)
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("streams", "options", "code"),
+    [
+        (">&-", "", 0),
+        ("2>&-", "", 0),
+        ("<&- >&- 2>&-", "--json", 0),
+        (">/dev/full", "", 1),
+        (">/dev/full", "--json", 1),
+    ],
+)
+def test_work_is_done_and_its_exit_code_is_right_whatever_becomes_of_the_output(
+    tmp_path: Path, streams: str, options: str, code: int
+) -> None:
+    out = tmp_path / "drawn.jsonl"
+    command = f"{sys.executable} -m flows.cli.main draw parallel --problems 1 --out {out} {options} {streams}"
+    done = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, check=False, cwd=Path(__file__).parents[3]
+    )
+    assert done.returncode == code
+    assert out.read_text().count("\n") == 1
+    assert done.stderr.count("\n") == code  # a line that says why
+    assert ("the output" in done.stderr) == bool(code)
