@@ -22,7 +22,7 @@ from tasks.requests.gather import (
     library_of,
     warn_if_short,
 )
-from tasks.requests.question_sources import is_held_back
+from tasks.requests.question_sources import holds_its_own, is_held_back
 from tasks.settings.errors import RunError
 
 LEARNED: Final = "learned"  # the name of a source
@@ -73,7 +73,7 @@ def make_challenger(
     with ExitStack() as stack:
         if old is None and asked.sources:
             drawn, of_sources = stack.enter_context(answers_of(asked.request(out), workers, flow))
-            warn_if_short(of_sources, asked.plans)
+            warn_if_short(of_sources, _wanted(asked, of_sources))
             libraries.append(library_of(vehicle, drawn))
             counts += of_sources
         if learned is not None and rows:
@@ -90,6 +90,24 @@ def make_challenger(
             save_library(out, _joined(libraries), how)
     remove(new)
     return counts if old is None or rows else []
+
+
+def are_plans_missing(asked: LibraryRetraining, counts: Sequence[SourceCounts]) -> bool:
+    """Whether the sources gave fewer plans than were asked for.
+
+    Args:
+        asked: which library, and how.
+        counts: what came of each source, in their order, and then of what was learned.
+    """
+    of_sources = counts[: len(asked.sources)]
+    return sum(each.answered for each in of_sources) < _wanted(asked, of_sources)
+
+
+def _wanted(asked: LibraryRetraining, of_sources: Sequence[SourceCounts]) -> int:
+    """How many plans are wanted of the sources: no more than files of problems hold."""
+    if all(map(holds_its_own, asked.sources)):
+        return min(asked.plans, sum(each.questions for each in of_sources))
+    return asked.plans
 
 
 def _joined(libraries: Sequence[PlanLibrary]) -> PlanLibrary:

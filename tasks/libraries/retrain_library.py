@@ -22,7 +22,7 @@ from tasks.champions.conclude import benchmark_tag, settle, summary_of, verdict_
 from tasks.champions.new_experience import note_verdict
 from tasks.fan_out.keys import key_of
 from tasks.inputs.gained_on_the_job import removed_if_it_fails, snapshot_of_questions
-from tasks.libraries.challenger import LEARNED, make_challenger
+from tasks.libraries.challenger import LEARNED, are_plans_missing, make_challenger
 from tasks.libraries.judge_library import (
     CHALLENGER,
     CHAMPION,
@@ -65,6 +65,7 @@ class RetrainedLibrary(NamedTuple):
     summary: str  # what became of it, in a line
     beside: str  # how it does beside the planner without a memory, in a line; empty if nothing was judged
     tables: Sequence[CellTable]  # of the judgement
+    is_short: bool  # whether its sources gave fewer plans than were asked for
 
 
 class _Made(NamedTuple):
@@ -137,12 +138,14 @@ def _retrained(
         publish_judgements(made.title, [(asked.name, summary, markdown)])
     if faults:
         raise RunError(" ".join(faults))
+    is_short = pending.is_anew and are_plans_missing(asked, made.counts)
     if judgement is None:
-        return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, "", [])
+        return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, "", [], is_short)
     if verdict != REFUSED:
         _warn_of_harm(made.title, judgement.alone)
     tables = [sides_table(judgement), *([] if ours is None else judgement_tables(ours))]
-    return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, _beside(judgement), tables)
+    beside = _beside(judgement)
+    return RetrainedLibrary(made.folder, made.counts, version, verdict, summary, beside, tables, is_short)
 
 
 @contextmanager

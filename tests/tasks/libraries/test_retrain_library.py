@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -32,11 +33,13 @@ from tasks.champions.promote import roll_back
 from tasks.inputs.gained_on_the_job import DIGITS, Solved, question_digest, remember
 from tasks.libraries import judge_library as judging
 from tasks.libraries import retrain_library as task
+from tasks.libraries.challenger import are_plans_missing
 from tasks.libraries.judge_library import ALL, ALONE, CHALLENGER, CHAMPION, FEWEST, OTHERS, judged
 from tasks.libraries.pending_library import LibraryRetraining, library_dry_run
 from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.registry.champion_registry import FIRST, PROMOTED, REFUSED, Registry, Version
 from tasks.requests import gather_pieces
+from tasks.requests.gather import SourceCounts
 from tasks.requests.question_sources import is_held_back
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.errors import RunError, UsageError
@@ -329,6 +332,38 @@ def test_where_all_that_was_learned_is_held_back_it_is_told(data: Path) -> None:
     with pytest.raises(RunError):
         task.retrain_library(data, ASKED._replace(sources=()))
     assert not _versions(data)
+
+
+@pytest.mark.parametrize(("sources", "most_asked", "code"), [([], 0, 0), (["perpendicular"], 4, 3)])
+def test_the_exit_code_tells_where_sources_gave_fewer_plans_than_were_asked_for(
+    data: Path, monkeypatch: pytest.MonkeyPatch, sources: list[str], most_asked: int, code: int
+) -> None:
+    def retrained(**given: Any) -> RetrainedLibrary | None:
+        return task.retrain_library(data, ASKED._replace(sources=tuple(given["sources"]), plans=5))
+
+    def numbers_of(_request: object) -> int:
+        return most_asked
+
+    _learn(data, 5, 4)
+    monkeypatch.setattr("flows.retrain_library.retrain_library", retrained)  # in this process
+    monkeypatch.setattr("tasks.servers.prefect_server.local_server", lambda _: nullcontext())
+    if most_asked:
+        monkeypatch.setattr(gather_pieces, "numbers_of", numbers_of)
+        monkeypatch.setattr(gather_pieces, "PIECE", most_asked)
+    assert call(["retrain-library", "slots", *sources, "--data", str(data)]) == code
+
+
+@pytest.mark.parametrize(
+    ("source", "questions", "answered", "is_missing"),
+    [("lot", 15, 3, False), ("lot", 15, 2, True), ("slots.jsonl", 2, 2, False), ("slots.jsonl", 2, 1, True)],
+)
+def test_files_are_asked_for_what_they_hold_and_what_is_drawn_for_all_plans(
+    source: str, questions: int, answered: int, is_missing: bool
+) -> None:
+    asked = ASKED._replace(sources=(source,))
+    learned = SourceCounts("learned", 9, 9, 9, 1.0)
+    counts = [SourceCounts(source, questions, answered, answered, 1.0), learned]
+    assert are_plans_missing(asked, counts) == is_missing
 
 
 def test_a_question_that_was_learned_judges_under_whatever_name_it_is_asked(tmp_path: Path) -> None:
