@@ -32,6 +32,7 @@ from planners.world.arrays import Floats
 
 RESAMPLES: Final = 10_000  # the end of an interval widened for 20 columns stands on 12 of them
 NOTICED_S: Final = 1e-3  # being later by less is no harm, however certain it is
+FEWEST_SHOWN: Final = 6  # problems: the range of fewer holds even their median with less than 95 %
 HEADINGS: Final = (
     "planner", "configuration", "champion ms", "challenger ms", "champion drives s", "drives s",
     "sooner s [95 %]", "champion solved %", "solved %", "champion hits %", "hits %", "verdict",
@@ -106,12 +107,15 @@ def judge(
 
 
 def judgement_line(judged: Judgement, who: str = "the challenger") -> str:
-    """The figures by which it was ``judged``, in one line about ``who``."""
+    """The figures by which it was ``judged``, in one line about ``who``; of a few problems, that they are."""
+    problems = f"{judged.problems:,} problem{'' if judged.problems == 1 else 's'}"
+    if judged.problems < FEWEST_SHOWN:
+        return f"{who} attempted {problems}: too few to say whether it is there sooner"
     less = 100 * judged.columns["reduction"].mean()
     time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
     line = (
         f"{who} is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
-        f"{judged.problems:,} problem{'' if judged.problems == 1 else 's'}, and plans in {time}"
+        f"{problems}, and plans in {time}"
     )
     if len(judged.columns) == 1:
         return line

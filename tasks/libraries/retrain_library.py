@@ -12,7 +12,13 @@ from typing import Any, Final, NamedTuple
 
 from dashboards.cells import CellTable, as_markdown
 from dashboards.verdicts.drift import FEWEST
-from dashboards.verdicts.promotion import Judgement, judgement_line, judgement_markdown, judgement_tables
+from dashboards.verdicts.promotion import (
+    FEWEST_SHOWN,
+    Judgement,
+    judgement_line,
+    judgement_markdown,
+    judgement_tables,
+)
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import remove
 from storage.places.scratch import scratch_folder
@@ -193,7 +199,7 @@ def _challenger(
 
 def _warn_of_harm(title: str, alone: Judgement) -> None:
     """Warn if robots are later with a library than without one, though it was not refused."""
-    if alone.high_s < 0.0:
+    if alone.problems >= FEWEST_SHOWN and alone.high_s < 0.0:
         few = f"; {alone.problems} questions are too few to refuse it, {FEWEST} would do"
         _LOG.warning("%s: %s%s.", title, HARM, few if alone.problems < FEWEST else "")
 

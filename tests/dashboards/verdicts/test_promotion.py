@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from dashboards.statistics.intervals import CONFIDENCE
 from dashboards.verdicts import promotion
 from dashboards.verdicts.promotion import (
     FEWER,
@@ -13,6 +16,7 @@ from dashboards.verdicts.promotion import (
     OPEN,
     SOONER,
     judge,
+    judgement_line,
     judgement_markdown,
     judgement_tables,
 )
@@ -156,3 +160,12 @@ def test_both_forms_show_every_column_and_the_verdict(champion: pd.DataFrame) ->
     assert "50.0 % less time" in text
     assert text.count("\n|") == COLUMNS + 2 * 2
     assert len(judgement_tables(found)) == 2
+
+
+@given(st.integers(1, 25))
+def test_an_interval_is_given_only_where_there_are_problems_enough_for_one(problems: int) -> None:
+    rows = attempts(("curves",), ("gust",), WITH_MEMORY[:1], problems=problems)
+    line = judgement_line(judge(rows, _times(rows, 0.5)))
+    reach = 1.0 - 2.0 * 0.5**problems  # how often the values of all problems reach over the true median
+    assert ("95 %" in line) == (reach >= CONFIDENCE)
+    assert str(problems) in line
