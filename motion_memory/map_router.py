@@ -19,6 +19,7 @@ from planners.world.arrays import Point, Pose
 from planners.world.compiling import working_clock
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
+from storage.errors import ended
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
 from storage.worlds.limits import check_resolution, check_size
@@ -120,7 +121,7 @@ class MapRouter:
         try:
             stops = stops_over(self._world, asked, self._vehicle, scale, goal_radius, tolerance, hitches)
         except ValueError as error:
-            raise UsageError(f"The {error}.") from None
+            raise UsageError(ended(f"The {error}")) from None
         for_poses = {"goal_tolerance": tolerance is not None, "goal_hitches": len(hitches) > 0}
         check_options(stops, for_poses, {"goal_radius": goal_radius is not None}, "a goal")
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
@@ -175,7 +176,7 @@ def _check_map(world: OccupancyMap) -> None:
         check_size(*occupied.shape)
         check_resolution(world.resolution)
     except ValueError as error:
-        raise UsageError(f"The map {error}.") from None
+        raise UsageError(ended(f"The map {error}")) from None
     _finite("origin of the map", world.origin, "x, y, turn")
 
 

@@ -28,6 +28,10 @@ class InUseError(StorageError):
 
 
 def sentence(subject: object, fault: object) -> str:
-    """One line that says what is wrong with a ``subject``, with a full stop unless it ends in a question."""
-    text = f"{subject} {fault}"
+    """One line that says what is wrong with a ``subject``, ended as ``ended`` does."""
+    return ended(f"{subject} {fault}")
+
+
+def ended(text: str) -> str:
+    """The ``text`` with a full stop, unless it ends in one or in a question."""
     return text if text.endswith(("?", ".")) else f"{text}."

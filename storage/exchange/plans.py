@@ -14,7 +14,7 @@ from planners.world.checked_problem import FAR_M, FARTHEST_M
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
-from storage.errors import StorageError
+from storage.errors import StorageError, ended
 from storage.fields import check_fields, number_of, short, text_of
 from storage.places.files import read_json, write_json
 from storage.vehicles.recorded_vehicle import record_of, refuse_another, vehicle_recorded
@@ -108,7 +108,7 @@ def read_plan(path: Path, vehicle: Vehicle | None = None) -> PlanRecord:
     except KeyError as error:
         raise StorageError(f"{path} lacks the field {error}; is it a plan?") from None
     except ValueError as error:
-        raise StorageError(f"{path}: {error}.") from None
+        raise StorageError(ended(f"{path}: {error}")) from None
 
 
 def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:

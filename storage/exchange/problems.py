@@ -13,7 +13,7 @@ import numpy as np
 from planners.world.checked_problem import checked_problem
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
-from storage.errors import StorageError
+from storage.errors import StorageError, ended
 from storage.exchange.obstacle_fields import groups_of, points_of
 from storage.exchange.problem_files import (
     MOVING,
@@ -87,7 +87,7 @@ def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) ->
         raise StorageError(f"{path} holds {count:,} problem{'s' * (count != 1)}{asked}{choose}.")
     ((where, problem),) = _checked(path, found, vehicle)
     if isinstance(problem, str):
-        raise StorageError(f"{where}: {problem}.")
+        raise StorageError(ended(f"{where}: {problem}"))
     if pick is not None:
         _LOG.info("problem  %s (%s)", problem.id, where)
     return problem
@@ -101,7 +101,7 @@ def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
     """
     for where, problem in problems_or_faults(path, vehicle):
         if isinstance(problem, str):
-            raise StorageError(f"{where}: {problem}.")
+            raise StorageError(ended(f"{where}: {problem}"))
         yield problem
 
 
@@ -170,7 +170,7 @@ def vehicle_of_problems(path: Path) -> Vehicle | None:
         try:
             return stated_vehicle(fields)
         except ValueError as error:
-            raise StorageError(f"{path}: {error}.") from None
+            raise StorageError(ended(f"{path}: {error}")) from None
     return None
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, name_of
-from storage.errors import StorageError
+from storage.errors import StorageError, ended
 from storage.fields import nearest, parse_json, scale_of, short
 from storage.vehicles.definitions import FIELDS, definition_of, is_built_in, vehicle_of
 from storage.yaml_text import yaml_fields
@@ -36,7 +36,7 @@ def read_vehicle(file: Path) -> Vehicle:
                 f"has the name of another vehicle, {short(vehicle.about.name.decode())}; choose another name"
             )
     except ValueError as error:
-        raise StorageError(f"{file} {str(error).rstrip('.')}.") from None
+        raise StorageError(ended(f"{file} {error}")) from None
     return vehicle
 
 
@@ -96,7 +96,7 @@ def _defined(text: str) -> Vehicle:
     try:
         return vehicle_of(fields)
     except ValueError as error:
-        raise StorageError(f"The vehicle {str(error).rstrip('.')}.") from None
+        raise StorageError(ended(f"The vehicle {error}")) from None
 
 
 def _path(given: str) -> Path:

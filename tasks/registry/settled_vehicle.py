@@ -6,6 +6,7 @@ from pathlib import Path
 
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.archives.libraries import holds_plans, vehicle_of
+from storage.errors import ended
 from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import vehicle_of_problems
 from storage.vehicles.stated_vehicle import refuse_another_driver, refuse_memory_of_another
@@ -39,7 +40,7 @@ def settled_vehicle(given: str | None, problems: Path | None = None, memory: str
         refuse_memory_of_another(stated, str(memory), _vehicle_of_memory(memory) or stated)
         refuse_another_driver(stated, said_vehicle(driver))
     except ValueError as error:
-        raise UsageError(f"{problems} {error}.") from None
+        raise UsageError(ended(f"{problems} {error}")) from None
     return driver
 
 

@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, get_args
 from dashboards.cells import CellTable, decimal
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, name_of
+from storage.errors import ended
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.exchange.problems import write_problems
 from storage.places.files import whole_folder
@@ -78,7 +79,7 @@ def import_settings(
     try:
         scale = scale_for_vehicle(scale, driven)
     except ValueError as error:
-        raise UsageError(f"{str(error).capitalize()}.") from None
+        raise UsageError(ended(str(error).capitalize())) from None
     if not 0.0 <= tolerance < math.inf:
         raise UsageError(f"Tolerance is {tolerance:g}: give 0 or more metres.")
     return ImportSettings(

@@ -19,6 +19,7 @@ from planners.world.checked_problem import NO_OBSTACLES
 from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Plan, Problem
 from planners.world.problem_faults import arrival_fault, motion_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of
+from storage.errors import ended
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.settings.errors import UsageError
 
@@ -150,7 +151,7 @@ def checked_motion(motion: Sequence[float], vehicle: Vehicle, scale: float) -> t
     start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, canonical)
     fault = motion_fault(start, vehicle)
     if fault is not None:
-        raise UsageError(f"The {fault}.")
+        raise UsageError(ended(f"The {fault}"))
     return canonical
 
 

@@ -13,6 +13,7 @@ from planners.routes.path_ahead import Stop
 from planners.world.arrays import Pose
 from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE
 from planners.world.vehicles.vehicle import Vehicle, name_of, trailers_of
+from storage.errors import ended
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
@@ -85,7 +86,7 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
     try:
         stops = stops_over(world, goals, vehicle, scale, near, tolerance, hitches)
     except ValueError as error:
-        raise UsageError(f"--goal-hitch: {error}.") from None
+        raise UsageError(ended(f"--goal-hitch: {error}")) from None
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
     for_poses = {"--goal-tolerance": tolerance is not None, "--goal-hitch": bool(hitches)}
@@ -99,7 +100,7 @@ def motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[fl
         given = start_motion_of(request.motion, vehicle)
     except ValueError as error:
         begins = "The start " if str(error).startswith("has ") else ""
-        raise UsageError(f"{begins}{error}.") from None
+        raise UsageError(ended(f"{begins}{error}")) from None
     return checked_motion(given, vehicle, scale)
 
 

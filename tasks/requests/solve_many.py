@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats
-from storage.errors import StorageError
+from storage.errors import StorageError, ended
 from storage.exchange.problem_files import raw_slice
 from storage.places.data_folder import open_data_folder
 from storage.tables.attempts import attempt_batches, attempt_columns, join_attempts
@@ -171,7 +171,7 @@ def solve_many(
         _LOG.warning(
             "All answers are written, but not all may be learned: %s Then solve the problems again, with "
             "another --out.",
-            unlearned,
+            ended(unlearned),
         )
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request), learned, unlearned)
 
@@ -204,12 +204,12 @@ def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[Par
 def _malformed(faults: Sequence[str]) -> StorageError:
     """One malformed problem is the error; several are told before it."""
     if len(faults) == 1:
-        what, which = faults[0].rstrip("."), "it"
+        what, which = ended(faults[0]), "it"
     else:
         tell_faults(faults)
-        what, which = f"{len(faults):,} problems are malformed", "them"
+        what, which = f"{len(faults):,} problems are malformed.", "them"
     return StorageError(
-        f"{what}. All parts of the file without a malformed problem are solved and kept: correct {which} and "
+        f"{what} All parts of the file without a malformed problem are solved and kept: correct {which} and "
         "repeat the command."
     )
 

@@ -17,7 +17,7 @@ from mlflow.exceptions import MlflowException
 from mlflow.pyfunc import PyFuncModel, scoring_server
 from starlette.types import Receive, Scope, Send
 
-from storage.errors import StorageError
+from storage.errors import StorageError, ended
 from storage.fields import check_fields, parse_json, short
 from tasks.tracking.memory_model import TOP_K
 
@@ -112,7 +112,7 @@ class Scoring:
         except StorageError as error:
             raise RefusedError(400, str(error)) from None
         except ValueError as error:
-            raise RefusedError(400, f"The body {error}.") from None
+            raise RefusedError(400, ended(f"The body {error}")) from None
         formats = [name for name in FORMATS if name in content]
         if len(formats) != 1:
             got = ", ".join(formats) or "none of them"

@@ -27,6 +27,7 @@ from dashboards.web.parameters import Parameters, link
 from dashboards.web.replay import Replay, replay
 from planners.search.query import Limits
 from planners.world.problem import Problem
+from storage.errors import ended
 from storage.places.run_folder import RunFolder
 from storage.tables.configurations import Configuration
 
@@ -112,7 +113,7 @@ def _replayed(
         try:
             return replay(drawn, planner, configuration, memory, seed, vehicle, limits)
         except ValueError as error:
-            raise NoticeError(f"This attempt cannot be made again: {error}.") from None
+            raise NoticeError(ended(f"This attempt cannot be made again: {error}")) from None
 
     key = ("replay", run.path, row["problem_id"], planner, configuration, row["memory"], seed, id(memory))
     return data.kept(key, made), drawn

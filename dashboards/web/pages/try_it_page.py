@@ -27,6 +27,7 @@ from planners.world.driving_cost import runs_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
+from storage.errors import ended
 from storage.exchange.problems import fields_of, problem_of
 from storage.fields import check_fields, text_of
 
@@ -101,7 +102,7 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
         check_fields(list(content), (*CHOICES, "world"))
         texts = {name: text_of(content[name], name) for name in CHOICES if name in content}
     except ValueError as error:
-        raise BadRequestError(f"What was sent: {error}.") from None
+        raise BadRequestError(ended(f"What was sent: {error}")) from None
     choices = Parameters(params.path, texts, params.run)
     planner = choices.one_of("planner", tuple(PLANNERS), "lattice")
     assist = choices.one_of("assist", ASSISTS, "repair")
@@ -111,7 +112,7 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
     canonical, alignment = to_canonical(problem)
     fault = scale_fault(memory, problem.scale) if memory is not None else None
     if fault is not None:
-        raise BadRequestError(f"The {fault}.")
+        raise BadRequestError(ended(f"The {fault}"))
     answers = []
     for use, used in [("none", None), (assist, memory)][: 1 if memory is None else 2]:
         attempt, milliseconds = _median(canonical, planner, use, used, vehicle)
@@ -155,7 +156,7 @@ def _median(
         try:
             attempt = solve(canonical, planner, assist, 5, memory, SEED, limits, vehicle, workspace=workspace)
         except ValueError as error:
-            raise BadRequestError(f"{error}.") from None
+            raise BadRequestError(ended(str(error))) from None
         if key not in _WARM:  # the first attempt of all loads what was compiled
             _WARM.add(key)
             began = perf_counter()
@@ -178,7 +179,7 @@ def _problem(fields: Any, vehicle: Vehicle) -> Problem:
     try:
         return problem_of(fields, "own", vehicle)
     except (ValueError, FloatingPointError) as error:
-        raise BadRequestError(f"The world {error}.") from None
+        raise BadRequestError(ended(f"The world {error}")) from None
 
 
 def _at_start(problem: Problem, vehicle: Vehicle) -> list[Any]:

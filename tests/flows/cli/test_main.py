@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -221,3 +222,41 @@ def test_work_is_done_and_its_exit_code_is_right_whatever_becomes_of_the_output(
     assert out.read_text().count("\n") == 1
     assert done.stderr.count("\n") == code  # a line that says why
     assert ("the output" in done.stderr) == bool(code)
+
+
+CUT_OFF = '{"start": [0, 0'
+FAR_BOUNDS = json.dumps(
+    {"start": [0, 0, 0], "goal": [5, 0], "goal_radius": 1, "bounds": [-9e5, -9e5, 9e5, 9e5], "obstacles": []}
+)
+IN_MILLIMETRES = """kind: car
+name: cart
+body: [[[-1000, -600], [3500, -600], [3500, 600], [-1000, 600]]]
+wheelbase: 1500
+limits: {speed: [-4, 4], acceleration: 1.2, steering: 1.2, steering_rate: 1.5}
+step: 0.05
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "command"),
+    [
+        ("p.jsonl", CUT_OFF, ["solve", "p.jsonl", "--out", "rows.parquet"]),
+        ("p.jsonl", FAR_BOUNDS, ["solve", "p.jsonl", "--out", "rows.parquet"]),
+        ("p.json", FAR_BOUNDS, ["plan", "p.json"]),
+        ("cart.yaml", IN_MILLIMETRES, ["draw", "lot", "--vehicle", "cart.yaml", "--out", "p.jsonl"]),
+    ],
+)
+def test_a_line_that_asks_something_has_no_full_stop_after_the_question(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    text: str,
+    command: list[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text(text)
+    assert call(command) != 0
+    told = capsys.readouterr().err
+    assert "?" in told
+    assert "?." not in told
