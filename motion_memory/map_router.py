@@ -168,7 +168,8 @@ def _check_map(world: OccupancyMap) -> None:
         raise UsageError(f"The map's occupied has no cells: its shape is {occupied.shape}.")
     if not is_grid:
         raise UsageError(
-            "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest."
+            "The map's occupied is no array [rows, columns] of bool; give one, row 0 the lowest: of a ROS "
+            "OccupancyGrid's cells, (cells < 0) | (cells >= 50)."
         )
     if not is_number(world.resolution):
         raise UsageError(f"The map's resolution is {short(world.resolution)}; give metres a cell.")
