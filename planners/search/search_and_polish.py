@@ -35,7 +35,10 @@ A_SECOND = 1000  # ... else it is improved, with so many expansions for each sec
 TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-SECOND = {"lattice": "follow"}  # planners that are asked as well where one finds nothing, or the way winds
+SECOND = {
+    "lattice": "follow"
+}  # planners that are asked as well where one finds nothing, or the way winds ...
+TRIES = (1, 3)  # ... with so many times the expansions, the second time only if there still is nothing
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
@@ -123,10 +126,17 @@ def _searched_and_polished(
     until = working_clock() + query.limits.seconds
     query, vehicle = asking_for_kinds(planner, query), query.vehicle
     found, (answer, rough) = _first_answer(planner, query, seed, given, below_s, until)
-    is_worth = answer.status is Status.BUDGET_SPENT if answer.plan is None else found.winds
-    if planner in SECOND and query.limits.second and is_worth and not query.others:
-        left = replace(query.limits, seconds=max(until - working_clock(), 0.0))
-        rng = generator(seed, "second", query.problem.id, planner)
+    asks = planner in SECOND and query.limits.second and not query.others
+    for number, times in enumerate(TRIES if asks else ()):
+        is_open = answer.plan is None and answer.status is Status.BUDGET_SPENT
+        if not is_open and (number > 0 or answer.plan is None or not found.winds):
+            break
+        left = replace(
+            query.limits,
+            expansions=times * query.limits.expansions,
+            seconds=max(until - working_clock(), 0.0),
+        )
+        rng = generator(seed, "second", query.problem.id, planner, number)
         second = replace(query, rng=rng, limits=left, beside=None)
         answers = [(answer, rough), _first_answer(SECOND[planner], second, seed, None, below_s, until)[1]]
         cheapest, rough = _cheapest(answers, vehicle)
