@@ -13,9 +13,10 @@ from typing import Final
 import numpy as np
 
 from planners.optimisation.descent import steps_to_goal
-from planners.optimisation.polish import polish_guesses
+from planners.optimisation.polish import polish, polish_guesses
 from planners.search.braking import is_free_drive
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
@@ -60,8 +61,10 @@ def rest_of(
             return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
     if len(controls) == 0:
         return None
-    guess = Plan(states, controls, vehicle.dt)
-    return polish_guesses(problem, [guess], vehicle, scene, workspace, until)[1].plan
+    guess, around = Plan(states, controls, vehicle.dt), (vehicle, scene, workspace)
+    if not problem.asks_for_pose:  # this keeps some centimetres off obstacles, where that costs little
+        return polish(problem, guess, *around, seconds=until - working_clock()).plan
+    return polish_guesses(problem, [guess], *around, until)[1].plan
 
 
 def fits(current: Plan, vehicle: Vehicle) -> bool:

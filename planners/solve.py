@@ -117,7 +117,7 @@ def solve(
         if rest is not None and (
             found.plan is None or cost_of(rest, vehicle) <= cost_of(found.plan, vehicle)
         ):
-            found = found._replace(plan=rest, source=KEPT, is_long=False, is_polished=False)
+            found = found._replace(plan=rest, source=KEPT, is_long=True, is_polished=True)
         view.lap("repair")
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
     if found.plan is None or found.is_long or (polished and not found.is_polished):
