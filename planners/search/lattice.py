@@ -94,7 +94,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     joined = False
     squeezed: Plan | None = None
     expected_s: float | None = None
-    winds = False
+    winds, straight = False, 0.0
     may_squeeze = not improving
     may_stop = not improving and query.prefix is None
 
@@ -104,7 +104,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return drawing_of(query.problem, query.workspace).occupied
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead, manoeuvring, joining, expected_s, winds
+        nonlocal level, tried, ahead, manoeuvring, joining, expected_s, winds, straight
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             cells = occupied()
@@ -121,6 +121,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         tried += 1
         if trial == 0 and ahead.table is NO_TABLE:
             expected_s = expected_seconds(tree.states, ahead, level.heading_s, level.late_s, vehicle)
+            if winds:  # through walls, maybe
+                expected_s = min(expected_s, settings.winding * straight / vehicle.max_speed)
         if improving:
             level = varied(level, settings.improving_greed, query)
         begin_lattice(tree, frontier, ahead, level, vehicle)
