@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,19 +35,15 @@ WORKSPACE = Workspace()
 FEW = Limits(expansions=8_000)
 
 
-def first_plan(problem: Problem, vehicle: Vehicle) -> Plan:
-    plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+ASKED = {"place": PLACE, "pose": POSE}
+CASES = st.tuples(st.sampled_from(list(ASKED)), st.sampled_from([CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER]))
+
+
+@cache
+def first_plan(kind: str, vehicle: Vehicle) -> Plan:
+    plan = solve(ASKED[kind], "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
     assert plan is not None
     return plan
-
-
-PLANS = {
-    (kind, vehicle): first_plan(problem, vehicle)
-    for kind, problem in (("place", PLACE), ("pose", POSE))
-    for vehicle in (CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER)
-}
-ASKED = {"place": PLACE, "pose": POSE}
-CASES = st.sampled_from(list(PLANS))
 
 
 def seen_from(state: np.ndarray, problem: Problem) -> Problem:
@@ -57,7 +54,7 @@ def seen_from(state: np.ndarray, problem: Problem) -> Problem:
 @settings(deadline=None, max_examples=12)
 @given(CASES, st.floats(0.0, 1.0), st.sampled_from([-math.tau, 0.0, math.tau]))
 def test_planning_again_never_arrives_later(case: tuple[str, Vehicle], share: float, turn: float) -> None:
-    (kind, vehicle), plan = case, PLANS[case]
+    (kind, vehicle), plan = case, first_plan(*case)
     at = int(share * (len(plan.states) - 1))
     state = plan.states[at].copy()
     state[2] += turn  # a measured heading knows no whole turns
@@ -75,7 +72,7 @@ def test_planning_again_never_arrives_later(case: tuple[str, Vehicle], share: fl
 def test_beside_its_plan_a_robot_drives_near_it(
     case: tuple[str, Vehicle], share: float, x: float, y: float, turn: float
 ) -> None:
-    (kind, vehicle), plan = case, PLANS[case]
+    (kind, vehicle), plan = case, first_plan(*case)
     at = int(share * (len(plan.states) - 1))
     state = plan.states[at].copy()
     state[:3] += (x, y, turn)
@@ -89,7 +86,7 @@ def test_beside_its_plan_a_robot_drives_near_it(
 
 
 def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> None:
-    rng, plan = np.random.default_rng(3), PLANS["place", CAR]
+    rng, plan = np.random.default_rng(3), first_plan("place", CAR)
     found = 0
     for at in range(0, len(plan.states) - 1, 5):
         state = plan.states[at].copy()
@@ -101,7 +98,7 @@ def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> Non
 
 @pytest.mark.parametrize("kind", ["place", "pose"])
 def test_a_blocked_plan_is_left(kind: str) -> None:
-    plan = PLANS[kind, CAR]
+    plan = first_plan(kind, CAR)
     at = len(plan.states) // 4
     x, y = plan.states[3 * len(plan.states) // 4, :2].tolist()
     problem = seen_from(plan.states[at], ASKED[kind])
@@ -115,13 +112,13 @@ def test_a_blocked_plan_is_left(kind: str) -> None:
 
 
 def test_who_is_elsewhere_has_no_plan_left() -> None:
-    plan = PLANS["pose", CAR]
+    plan = first_plan("pose", CAR)
     elsewhere = seen_from(np.array([28.0, 0.0, 0.0, 0.0, 0.0]), POSE)
     assert rest_of(plan, elsewhere, CAR, scene_of(elsewhere), WORKSPACE, math.inf) is None
 
 
 def test_a_goal_may_move_meanwhile() -> None:
-    plan = PLANS["pose", CAR]
+    plan = first_plan("pose", CAR)
     at = len(plan.states) // 2
     problem = replace(seen_from(plan.states[at], POSE), goal=(26.0, 11.0))
     rest = rest_of(plan, problem, CAR, scene_of(problem), WORKSPACE, math.inf)
@@ -130,7 +127,7 @@ def test_a_goal_may_move_meanwhile() -> None:
 
 
 def test_a_plan_fits_the_vehicle_that_drives_it() -> None:
-    plan = PLANS["place", CAR_1_TRAILER]
+    plan = first_plan("place", CAR_1_TRAILER)
     assert fits(plan, CAR_1_TRAILER)
     assert not fits(plan, CAR)
     assert not fits(replace(plan, dt=0.5 * plan.dt), CAR_1_TRAILER)
