@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from planners.current_plan import fits
+from planners.world.arrays import Floats
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.fields import short
@@ -17,8 +22,30 @@ def check_plan(name: str, given: Plan) -> None:
         )
 
 
-def check_current(given: Plan, vehicle: Vehicle) -> None:
-    """Raise UsageError unless what is given as the plan being driven is one of a vehicle."""
+def current_plan(given: Plan, vehicle: Vehicle) -> Plan:
+    """The plan that is being driven, as numbers of double precision.
+
+    Args:
+        given: by the caller.
+        vehicle: that drives it.
+
+    Raises:
+        UsageError: it is none, or one of a vehicle with other variables or another step.
+    """
     check_plan("current", given)
-    if not fits(given, vehicle):
+    try:
+        with np.errstate(all="ignore"):
+            plan = Plan(_numbers(given.states), _numbers(given.controls), float(given.dt))
+    except (TypeError, ValueError):
+        raise UsageError("current holds states or controls that are no arrays of numbers.") from None
+    if not fits(plan, vehicle):
         raise UsageError(f"current is no plan of {name_of(vehicle)}: give one that was planned for it.")
+    if not (np.isfinite(plan.states).all() and np.isfinite(plan.controls).all()):
+        raise UsageError("current holds NaN or infinity; give the plan as an answer holds it.")
+    return plan
+
+
+def _numbers(given: Any) -> Floats:
+    if np.iscomplexobj(given):
+        raise TypeError
+    return np.array(given, np.float64)

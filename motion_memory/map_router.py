@@ -9,7 +9,7 @@ import numpy as np
 
 from motion_memory.answers import RouteAnswer
 from motion_memory.array_problems import motion_given, numbers_given
-from motion_memory.given_plans import check_current
+from motion_memory.given_plans import current_plan
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.leg_search import Solve
 from planners.routes.router import Router
@@ -144,8 +144,8 @@ class MapRouter:
 
     def _in_grid(self, current: Plan) -> Plan:
         """A plan in the map's frame, in canonical metres of its grid. Raises UsageError if it is none."""
-        check_current(current, self._vehicle)
-        return in_grid_of(self._world, scaled(current, 1.0 / self._scale), self._scale)
+        near = scaled(current_plan(current, self._vehicle), 1.0 / self._scale)
+        return in_grid_of(self._world, near, self._scale)
 
 
 def _finite(name: str, given: Sequence[float], *meanings: str) -> list[float]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from motion_memory.answers import Answer, RouteAnswer
 from motion_memory.array_problems import problem_of_arrays
 from motion_memory.extras import may_lack
-from motion_memory.given_plans import check_current, check_plan
+from motion_memory.given_plans import check_plan, current_plan
 from motion_memory.plain import plain
 from planners.attempt import NEW, Attempt
 from planners.memory.library.plan_library import PlanLibrary
@@ -282,8 +282,8 @@ class Memory:
         limits = usual_limits(canonical, time_limit)
         driven: Plan | None = None
         if current is not None:
-            check_current(current, self.vehicle)
-            driven = in_canonical(_in_frame_of(problem, current), alignment)
+            near = _in_frame_of(problem, current_plan(current, self.vehicle))
+            driven = in_canonical(near, alignment)
         with self._workspace() as workspace:
             attempt = self._attempt(canonical, limits, workspace, self.assist, driven)
             if improve_seconds > 0.0:

@@ -20,11 +20,12 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
-from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.dynamics import control_limits, simulate, turn_limit
 from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.workspace import Workspace
 
 OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and shares of full speed together
+ROUNDING: Final = 1e-9  # on limits, m/s and radians
 SAME: Final = 1e-6  # metres, m/s and radians: who is off by no more drives the same controls on
 
 
@@ -53,9 +54,11 @@ def rest_of(
     nearest = len(off) - 1 - int(off[::-1].argmin())  # the last of those where it stands
     if off[nearest] > OFF:
         return None
-    controls = current.controls[nearest:]
+    most = control_limits(vehicle)  # which may be lower than when the plan was made
+    controls = np.clip(current.controls[nearest:], np.negative(most), most)
     states = simulate(start, controls, vehicle)
-    if np.abs(states[0] - _turned_to(current.states[nearest], start)).max() <= SAME:
+    is_on_plan = np.abs(start - _turned_to(current.states[nearest], start)).max() <= SAME
+    if is_on_plan and _is_within_limits(states, vehicle):
         steps = int(steps_to_goal(states, len(controls), goal, vehicle))
         if steps >= 0 and is_free_drive(states[: steps + 1], vehicle, scene):
             return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
@@ -86,6 +89,17 @@ def _off(states: Floats, state: Floats, vehicle: Vehicle) -> Floats:
     faster = np.abs(states[:, 3] - state[3]) / vehicle.max_speed
     off: Floats = away + turned + faster + others
     return off
+
+
+def _is_within_limits(states: Floats, vehicle: Vehicle) -> bool:
+    """Whether speeds and steering, or turn rates, of ``states [T, S]`` are those of a vehicle."""
+    speeds, turns = states[:, 3], np.abs(states[:, 4])
+    lowest, highest = vehicle.min_speed - ROUNDING, vehicle.max_speed + ROUNDING
+    return bool(
+        (speeds >= lowest).all()
+        and (speeds <= highest).all()
+        and turns.max() <= turn_limit(vehicle) + ROUNDING
+    )
 
 
 def _turned_to(state: Floats, other: Floats) -> Floats:

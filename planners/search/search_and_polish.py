@@ -17,7 +17,7 @@ from planners.search.manoeuvres.forward_arrivals import arrive_forwards
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.variants import counting_time, slowed
 from planners.search.outcome import Outcome, Status
-from planners.search.query import Query
+from planners.search.query import POSE_EXPANSIONS, Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
@@ -38,7 +38,7 @@ BESIDE = 4000  # expansions of the first search beside a plan that is given wher
 SECOND = {
     "lattice": "follow"
 }  # planners that are asked as well where one finds nothing, or the way winds ...
-TRIES = (1, 3)  # ... with so many times the expansions, the second time only if there still is nothing
+TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
@@ -128,12 +128,15 @@ def _searched_and_polished(
     found, (answer, rough) = _first_answer(planner, query, seed, given, below_s, until)
     asks = planner in SECOND and query.limits.second and not query.others
     for number, times in enumerate(TRIES if asks else ()):
+        expansions = times * query.limits.expansions
         is_open = answer.plan is None and answer.status is Status.BUDGET_SPENT
+        if number > 0 and expansions > POSE_EXPANSIONS:
+            break
         if not is_open and (number > 0 or answer.plan is None or not found.winds):
             break
         left = replace(
             query.limits,
-            expansions=times * query.limits.expansions,
+            expansions=expansions,
             seconds=max(until - working_clock(), 0.0),
         )
         rng = generator(seed, "second", query.problem.id, planner, number)

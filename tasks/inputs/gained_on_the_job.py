@@ -16,7 +16,7 @@ from planners.attempt import NEW, Attempt
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Arrival, Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
-from storage.errors import StorageError
+from storage.errors import InUseError, StorageError
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place, remove
 from storage.places.run_folder import checked_name
@@ -125,13 +125,16 @@ def snapshot_of_questions(data: Path | str, vehicle: Vehicle, name: str) -> Path
 def removed_if_it_fails(snapshot: Path) -> Iterator[None]:
     """Remove a snapshot if the work with it raises an error: the next try is with what was learned by then.
 
-    Work that is killed or interrupted leaves it, so that the same command goes on with it.
+    Work that is killed or interrupted leaves it, so that the same command goes on with it. So does work that
+    is refused because another command does it: that one reads the snapshot.
 
     Args:
         snapshot: the file of a snapshot that nothing rests on yet.
     """
     try:
         yield
+    except InUseError:
+        raise
     except Exception:
         remove(snapshot)
         raise

@@ -154,9 +154,8 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 learned += remember(request.learn, solved, assistant.vehicle)
         except (StorageError, OSError) as error:
             unlearned = str(error)
-        finally:
-            solved.clear()
-            write_attempts(path, rows, key=chunk.key)
+        solved.clear()
+        write_attempts(path, rows, key=chunk.key)
 
     read = list(problems_or_faults_of(chunk.problem_slice, assistant.vehicle))
     problems = [problem for _, problem in read if not isinstance(problem, str)]

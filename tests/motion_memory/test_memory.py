@@ -192,3 +192,27 @@ def test_the_example_of_the_page_runs_without_what_a_robot_has_not(memory: Path,
     lines = done.stdout.splitlines()
     assert lines[-1] == "[]"
     assert re.fullmatch(r"(recalled|repaired|searched): \d+ states in [0-9.]+ ms", lines[0])
+
+
+def test_the_current_plan_is_numbers_of_any_kind_and_nothing_else(planner: Memory) -> None:
+    asked = problem(0)
+    plan = planner.plan(asked).plan
+    assert plan is not None
+    half = len(plan.states) // 2
+    x, y, heading, *motion = plan.states[half].tolist()
+    moved = replace(asked, start=(x, y, heading), start_motion=tuple(motion))
+    lists = replace(plan, states=plan.states.tolist(), controls=plan.controls.tolist())
+    single = replace(plan, states=plan.states.astype(np.float32), controls=plan.controls.astype(np.float32))
+    for given in (plan, lists, single):
+        answer = planner.plan(moved, current=given)
+        assert answer.plan is not None
+        assert answer.plan.duration_s <= plan.duration_s - half * plan.dt + 1e-9
+    for wrong in (
+        planner.plan(asked),
+        replace(plan, states=plan.states * math.nan),
+        replace(plan, controls=plan.controls + 1j),
+        replace(plan, states=plan.states.astype(str)[:, :1] + "m"),
+        replace(plan, dt=None),
+    ):
+        with pytest.raises(UsageError, match="current"):
+            planner.plan(moved, current=wrong)

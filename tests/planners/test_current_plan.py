@@ -132,3 +132,28 @@ def test_a_plan_fits_the_vehicle_that_drives_it() -> None:
     assert not fits(plan, CAR)
     assert not fits(replace(plan, dt=0.5 * plan.dt), CAR_1_TRAILER)
     assert not fits(replace(plan, controls=plan.controls[1:]), CAR_1_TRAILER)
+
+
+@pytest.mark.parametrize(
+    "slower",
+    [{"max_acceleration": 1.0}, {"max_steering_rate": 0.5}, {"max_speed": 3.0}, {"max_steering": 0.4}],
+)
+def test_who_may_do_less_than_planned_drives_on_within_the_new_limits(slower: dict[str, float]) -> None:
+    plan, vehicle = first_plan("place", CAR), CAR._replace(**slower)
+    for at in range(0, len(plan.states), 20):
+        state = plan.states[at].copy()
+        state[3] = min(state[3], vehicle.max_speed)
+        state[4] = np.clip(state[4], -vehicle.max_steering, vehicle.max_steering)
+        problem = seen_from(state, PLACE)
+        rest = rest_of(plan, problem, vehicle, scene_of(problem), WORKSPACE, math.inf)
+        assert rest is None or faults(problem, rest, vehicle) == []
+
+
+def test_a_plan_of_lower_precision_is_driven_on() -> None:
+    plan = first_plan("place", CAR)
+    rounded = Plan(*(each.astype(np.float32).astype(np.float64) for each in (plan.states, plan.controls)))
+    for at in range(0, len(plan.states), 20):
+        problem = seen_from(plan.states[at], PLACE)
+        rest = rest_of(rounded, problem, CAR, scene_of(problem), WORKSPACE, math.inf)
+        assert rest is not None
+        assert faults(problem, rest) == []

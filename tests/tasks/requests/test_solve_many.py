@@ -319,6 +319,21 @@ def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) ->
     assert len(shards) == -(-COUNT // SIZE)
 
 
+def test_what_ctrl_c_kept_from_being_learned_is_learned_by_the_same_command_again(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> int:
+        raise KeyboardInterrupt
+
+    out, data = tmp_path / "rows.parquet", tmp_path / "data"
+    with monkeypatch.context() as stopped:
+        stopped.setattr(parts, "remember", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            solve_many(ASSISTANT, problems, out, learn=data)
+    solve_many(ASSISTANT, problems, out, learn=data)
+    assert len(gained_experiences.read_gained(open_data_folder(data).gained("car"), CAR)) == COUNT
+
+
 def test_answers_are_written_where_learning_fails(
     problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: pd.DataFrame
 ) -> None:
