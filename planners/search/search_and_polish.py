@@ -54,14 +54,15 @@ def search_and_polish(
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
-    first search took, the worse its plan mostly is, and the longer they may take. If the answer still takes
-    much longer than the planner expected, it is improved for as long as that is worth. A given plan may be of
-    a worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
+    first search took, the worse its plan mostly is, and the longer they may take. Where nothing is found, or
+    the way winds, another planner is asked as well. If the answer still takes much longer than the planner
+    expected, it is improved for as long as that is worth. A given plan may be of a worse kind than what the
+    planner finds, so it searches as if there were none, but at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.
-        query: what it is asked; its limits are those of all searches but the improvement, which has as many
-            expansions again; its seconds are those of the polish and the improvement, too.
+        query: what it is asked; its limits are those of all searches but those of another planner and the
+            improvement, which have expansions of their own; its seconds are those of all, polish included.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
         below_s: only a plan that costs less is wanted: the search goes on for as long as that is worth, and
@@ -125,25 +126,10 @@ def _searched_and_polished(
     """As ``search_and_polish``, once."""
     until = working_clock() + query.limits.seconds
     query, vehicle = asking_for_kinds(planner, query), query.vehicle
-    found, (answer, rough) = _first_answer(planner, query, seed, given, below_s, until)
-    asks = planner in SECOND and query.limits.second and not query.others
-    for number, times in enumerate(TRIES if asks else ()):
-        expansions = times * query.limits.expansions
-        is_open = answer.plan is None and answer.status is Status.BUDGET_SPENT
-        if number > 0 and expansions > POSE_EXPANSIONS:
-            break
-        if not is_open and (number > 0 or answer.plan is None or not found.winds):
-            break
-        left = replace(
-            query.limits,
-            expansions=expansions,
-            seconds=max(until - working_clock(), 0.0),
-        )
-        rng = generator(seed, "second", query.problem.id, planner, number)
-        second = replace(query, rng=rng, limits=left, beside=None)
-        answers = [(answer, rough), _first_answer(SECOND[planner], second, seed, None, below_s, until)[1]]
-        cheapest, rough = _cheapest(answers, vehicle)
-        answer = _with_work([each for each, _ in answers], cheapest)
+    found, best = _first_answer(planner, query, seed, given, below_s, until)
+    if planner in SECOND and query.limits.second and not query.others:
+        best = _with_second(SECOND[planner], query, seed, found.winds, best, below_s, until)
+    answer, rough = best
     plan, expected_s = answer.plan, found.expected_s
     too_long_s = 0.0 if plan is None or expected_s is None else plan.duration_s - expected_s
     if (
@@ -210,6 +196,32 @@ def _first_answer(
         best, rough = replace(best, joined=rough is given), forwards  # it begins as the other drive, no more
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
     return found[0], (answer, rough)
+
+
+def _with_second(
+    planner: str,
+    query: Query,
+    seed: int,
+    winds: bool,
+    best: tuple[Outcome, Plan | None],
+    below_s: float,
+    until: float,
+) -> tuple[Outcome, Plan | None]:
+    """The cheaper of an answer and that of another planner, if the way winds or nothing was found."""
+    for number, times in enumerate(TRIES):
+        answer, expansions = best[0], times * query.limits.expansions
+        is_worth = winds and number == 0
+        if answer.plan is None:
+            is_worth = answer.status is Status.BUDGET_SPENT and (number == 0 or expansions <= POSE_EXPANSIONS)
+        if not is_worth:
+            break
+        limits = replace(query.limits, expansions=expansions, seconds=max(until - working_clock(), 0.0))
+        rng = generator(seed, "second", query.problem.id, planner, number)
+        asked = replace(query, rng=rng, limits=limits, beside=None)
+        answers = [best, _first_answer(planner, asked, seed, None, below_s, until)[1]]
+        cheapest, rough = _cheapest(answers, query.vehicle)
+        best = _with_work([each for each, _ in answers], cheapest), rough
+    return best
 
 
 def _improved(
