@@ -34,8 +34,7 @@ def current_plan(given: Plan, vehicle: Vehicle) -> Plan:
     """
     check_plan("current", given)
     try:
-        with np.errstate(all="ignore"):
-            plan = Plan(_numbers(given.states), _numbers(given.controls), float(given.dt))
+        plan = Plan(_numbers(given.states), _numbers(given.controls), float(given.dt))
     except (TypeError, ValueError):
         raise UsageError("current holds states or controls that are no arrays of numbers.") from None
     if not fits(plan, vehicle):

@@ -150,8 +150,7 @@ class Router:
         paths = []
         self._search.begin(until)
         for number, stop in enumerate(stops):
-            ahead = PathAhead(self._paths, stop, self._scene, state)
-            path = ahead.path(state)
+            ahead, path = self._first_way(stop, state)
             goal = _goal_name(number, stops)
             if path is None:
                 why = f"{goal} cannot be reached: no way that is wide enough leads there"
@@ -176,6 +175,21 @@ class Router:
             paths.append(np.vstack((problems[number].start[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
+
+    def _first_way(self, stop: Stop, state: Floats) -> tuple[PathAhead, Floats | None]:
+        """The paths to a stop that are tried first, and the one ``[n, 2]`` from a state ``[S]``, if there is.
+
+        They are the shortest, but for trains those with a little more room, if they are hardly longer: around
+        a corner trailers come nearer to it than the vehicle that pulls them.
+        """
+        ahead = PathAhead(self._paths, stop, self._scene, state)
+        path = ahead.path(state)
+        if path is not None and trailers_of(self._vehicle):
+            roomier = PathAhead(self._wider[0](), stop, self._scene, state)
+            other = roomier.path(state)
+            if other is not None and length_of(other) <= length_of(path) + DETOUR_M:
+                return roomier, other
+        return ahead, path
 
     def refusal(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Stuck | None:
         """Why start or goals cannot be used, if so; arguments as of ``route``."""

@@ -392,3 +392,19 @@ def test_a_gap_that_is_too_narrow_does_not_hide_a_door_farther_away() -> None:
     world = OccupancyMap("detour", (x > 20.0) & (x < 20.3) & ~free, 0.1)
     found = check(Router(world, searched).route((5.0, 10.0, 0.0), [Stop((35.0, 10.0))]))
     assert found.plan(CAR).states[:, 1].max() > 49.0
+
+
+def test_trains_keep_farther_from_corners_than_a_single_vehicle() -> None:
+    occupied = np.zeros((200, 300), bool)
+    occupied[:124, 145:155] = True  # a wall, around whose end the way leads
+    world = OccupancyMap("wall", occupied, 0.1)
+    start, stop = (5.0, 6.0, 1.0), Stop((25.0, 6.0))
+    near = []
+    for vehicle in (CAR, CAR_1_TRAILER):
+        route = check(
+            Router(world, partial(searched, vehicle=vehicle), vehicle).route(start, [stop]), vehicle
+        )
+        x, y = route.paths[0].T
+        off = np.hypot(np.maximum(np.abs(x - 15.0) - 0.5, 0.0), np.maximum(y - 12.4, 0.0))
+        near.append(float(off[1:-1].min()))
+    assert near[1] > near[0]
