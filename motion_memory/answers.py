@@ -32,7 +32,7 @@ class RouteAnswer:
     """The result of looking for a drive across a map."""
 
     status: str  # "solved" or "stuck"
-    source: str | None  # "searched" if any local plan was, else "repaired" or "recalled"; None when stuck
+    source: str | None  # "searched" if any local plan was, else "repaired", "recalled", "kept"; None: stuck
     plan: Plan | None  # in the map's frame and metres; None when stuck
     why: str | None  # one clause: why and where it is stuck, or that the time is up; None when solved
     local_plans: int  # how many were looked for

@@ -36,11 +36,13 @@ def current_plan(given: Plan, vehicle: Vehicle) -> Plan:
     try:
         plan = Plan(_numbers(given.states), _numbers(given.controls), float(given.dt))
     except (TypeError, ValueError):
-        raise UsageError("current holds states or controls that are no arrays of numbers.") from None
+        raise UsageError(
+            "The states, controls or time step of current are no numbers: give the plan of an answer."
+        ) from None
     if not fits(plan, vehicle):
         raise UsageError(f"current is no plan of {name_of(vehicle)}: give one that was planned for it.")
     if not (np.isfinite(plan.states).all() and np.isfinite(plan.controls).all()):
-        raise UsageError("current holds NaN or infinity; give the plan as an answer holds it.")
+        raise UsageError("The plan given as current holds NaN or infinity: give the plan of an answer.")
     return plan
 
 

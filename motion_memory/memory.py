@@ -86,7 +86,7 @@ class Memory:
 
         Raises:
             ValueError: the problem is malformed or impossible, the memory is not made for its scale, a time
-                is no possible number of seconds, or the current plan is none of this vehicle.
+                is no possible number of seconds, or this vehicle cannot drive the current plan.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
@@ -132,8 +132,8 @@ class Memory:
 
         Raises:
             ValueError: an array has another shape, the goal is a pose and there is an arrival too, the
-                problem is impossible, a time is no possible number of seconds, or the current plan is none of
-                this vehicle.
+                problem is impossible, a time is no possible number of seconds, or this vehicle cannot drive
+                the current plan.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()

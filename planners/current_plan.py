@@ -50,15 +50,15 @@ def rest_of(
         free and leads to the goal.
     """
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
-    off = _off(current.states, start, vehicle)
+    differences = _differences(current.states, start)
+    off = _off(differences, vehicle)
     nearest = len(off) - 1 - int(off[::-1].argmin())  # the last of those where it stands
     if off[nearest] > OFF:
         return None
     most = control_limits(vehicle)  # which may be lower than when the plan was made
     controls = np.clip(current.controls[nearest:], np.negative(most), most)
     states = simulate(start, controls, vehicle)
-    is_on_plan = np.abs(start - _turned_to(current.states[nearest], start)).max() <= SAME
-    if is_on_plan and _is_within_limits(states, vehicle):
+    if np.abs(differences[nearest]).max() <= SAME and _is_within_limits(states, vehicle):
         steps = int(steps_to_goal(states, len(controls), goal, vehicle))
         if steps >= 0 and is_free_drive(states[: steps + 1], vehicle, scene):
             return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
@@ -72,22 +72,27 @@ def rest_of(
 
 def fits(current: Plan, vehicle: Vehicle) -> bool:
     """Whether states and steps of a plan are those of a vehicle."""
-    states = np.asarray(current.states)
+    states, controls = current.states, current.controls
     return (
         current.dt == vehicle.dt
         and states.ndim == 2
         and states.shape[1] == state_size(vehicle)
-        and np.shape(current.controls) == (len(states) - 1, 2)
+        and controls.shape == (len(states) - 1, 2)
     )
 
 
-def _off(states: Floats, state: Floats, vehicle: Vehicle) -> Floats:
-    """How far each of ``states [T, S]`` is from a state ``[S]``: lengths, radians, shares of full speed."""
-    away = np.hypot(*(states[:, :2] - state[:2]).T) / (vehicle.front + vehicle.rear)
-    turned = np.abs(_wrapped(states[:, 2] - state[2]))
-    others = np.abs(states[:, 4:] - state[4:]).sum(axis=1)
-    faster = np.abs(states[:, 3] - state[3]) / vehicle.max_speed
-    off: Floats = away + turned + faster + others
+def _differences(states: Floats, state: Floats) -> Floats:
+    """Each of ``states [T, S]`` less a state ``[S]``; headings may differ by whole turns besides."""
+    differences: Floats = states - state
+    differences[:, 2] = np.remainder(differences[:, 2] + math.pi, math.tau) - math.pi
+    return differences
+
+
+def _off(differences: Floats, vehicle: Vehicle) -> Floats:
+    """How much each of the ``differences [T, S]`` is: lengths, radians and shares of full speed together."""
+    away = np.hypot(differences[:, 0], differences[:, 1]) / (vehicle.front + vehicle.rear)
+    faster = np.abs(differences[:, 3]) / vehicle.max_speed
+    off: Floats = away + faster + np.abs(differences[:, [2, *range(4, differences.shape[1])]]).sum(axis=1)
     return off
 
 
@@ -100,15 +105,3 @@ def _is_within_limits(states: Floats, vehicle: Vehicle) -> bool:
         and (speeds <= highest).all()
         and turns.max() <= turn_limit(vehicle) + ROUNDING
     )
-
-
-def _turned_to(state: Floats, other: Floats) -> Floats:
-    """A state ``[S]`` with its heading written as that of another, whole turns apart or not."""
-    turned = state.copy()
-    turned[2] = other[2] + _wrapped(state[2] - other[2])
-    return turned
-
-
-def _wrapped(angles: Floats) -> Floats:
-    wrapped: Floats = np.remainder(angles + math.pi, math.tau) - math.pi
-    return wrapped

@@ -39,7 +39,9 @@ from planners.world.view import View
 from planners.world.workspace import Workspace
 
 _WITH_MEMORY = ("closed", "open", "repair", "join", "published-open")
-FOR_DRIVES = 0.5  # share of the time in which stored drives are moved: the search has the other half
+FOR_DRIVES = (
+    0.5  # share of the time in which drives that are at hand are moved: the search has the other half
+)
 ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
 
 
@@ -102,18 +104,17 @@ def solve(
         raise ValueError(fault)
     limits = limits or usual_limits(problem)
     view = aimed_view(problem, vehicle, workspace)
-    problem = view.problem
+    problem, until = view.problem, view.began + FOR_DRIVES * limits.seconds
     if assist in WITHOUT_MEMORY or memory is None:
         memory, found = None, MemoryAnswer()
     else:
         found = answer_from(
             *(memory, view, planner, top_k, seed, strategy, vehicle, assist),
             polished=polished,
-            until=view.began + FOR_DRIVES * limits.seconds,
+            until=until,
         )
     if current is not None:
-        ends = view.began + FOR_DRIVES * limits.seconds
-        rest = rest_of(current, problem, vehicle, view.scene, view.workspace, ends)
+        rest = rest_of(current, problem, vehicle, view.scene, view.workspace, until)
         if rest is not None and (
             found.plan is None or cost_of(rest, vehicle) <= cost_of(found.plan, vehicle)
         ):

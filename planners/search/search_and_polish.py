@@ -35,9 +35,7 @@ A_SECOND = 1000  # ... else it is improved, with so many expansions for each sec
 TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-SECOND = {
-    "lattice": "follow"
-}  # planners that are asked as well where one finds nothing, or the way winds ...
+SECOND = {"lattice": "follow"}  # who is asked as well where a planner finds nothing, or the way winds ...
 TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 

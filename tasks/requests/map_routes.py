@@ -166,11 +166,14 @@ def check_route(route: Route, plan: Plan, vehicle: Vehicle, seed: int) -> None:
 
 def in_frame_of(world: OccupancyMap, plan: Plan, scale: float) -> Plan:
     """A route's plan, in canonical metres of a map's grid, in those of the map's frame."""
-    left, bottom, turn = world.origin
-    return from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
+    return from_canonical(plan, _grid_in_frame(world, scale))
 
 
 def in_grid_of(world: OccupancyMap, plan: Plan, scale: float) -> Plan:
     """A plan in a map's frame, in canonical metres, in those of the map's grid."""
+    return in_canonical(plan, _grid_in_frame(world, scale))
+
+
+def _grid_in_frame(world: OccupancyMap, scale: float) -> Alignment:
     left, bottom, turn = world.origin
-    return in_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
+    return Alignment((left / scale, bottom / scale), -turn)
