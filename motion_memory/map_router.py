@@ -26,7 +26,7 @@ from storage.worlds.limits import check_resolution, check_size
 from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
-    check_drives_backwards,
+    check_can_stop,
     check_options,
     check_route,
     checked_motion,
@@ -66,7 +66,7 @@ class MapRouter:
             seed: for the error that the judge raises.
         """
         _check_map(world)
-        check_drives_backwards(vehicle)
+        check_can_stop(vehicle)
         if not (is_number(tolerance_m) and tolerance_m >= 0.0):
             raise UsageError(f"tolerance_m is {short(tolerance_m)}; give metres, 0 or more.")
         self._world, self._scale = world, scale_for_vehicle(scale, vehicle)

@@ -157,7 +157,7 @@ class Memory:
             tolerance_m: metres by which outlines of occupied regions may move, which makes them simpler.
 
         Raises:
-            ValueError: the map is none, or too wide, or the vehicle cannot drive backwards.
+            ValueError: the map is none, or too wide, or the vehicle cannot stop.
             RunError: SciPy is not installed.
         """
         with may_lack("Routes"):

@@ -27,7 +27,7 @@ from tasks.requests.assistant import Assistant
 from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
-    check_drives_backwards,
+    check_can_stop,
     check_route,
     in_frame_of,
 )
@@ -83,7 +83,7 @@ def drive_route(
     check_picture(drawing)
     check_time_limit(request.time_limit, "--time-limit")
     pose = start_of(request)
-    check_drives_backwards(assistant.vehicle)
+    check_can_stop(assistant.vehicle)
     source = map_source(path, map_format, "a route")
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = told_map(source, settings)

@@ -46,10 +46,13 @@ class LocalSolver:
         return attempt
 
 
-def check_drives_backwards(vehicle: Vehicle) -> None:
-    """Raise UsageError if a vehicle cannot drive backwards, as routes may need."""
-    if vehicle.min_speed >= 0.0:
-        raise UsageError(f"A route needs a vehicle that can drive backwards; {name_of(vehicle)} cannot.")
+def check_can_stop(vehicle: Vehicle) -> None:
+    """Raise UsageError if a vehicle cannot stop, as it does at each goal of a route."""
+    if vehicle.min_speed > 0.0:
+        raise UsageError(
+            f"A route stops at each of its goals; {name_of(vehicle)} cannot stop, since its least speed is "
+            "above 0. Use `plan`, with a range of speeds at the goal."
+        )
 
 
 def canonical_map(world: OccupancyMap, scale: float, name: str) -> OccupancyMap:

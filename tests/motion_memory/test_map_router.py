@@ -194,7 +194,7 @@ def test_bad_maps_get_one_line(
         alone.router(replace(world, **changed))
 
 
-def test_what_is_no_map_and_who_cannot_reverse_are_refused(
+def test_what_is_no_map_and_who_cannot_stop_are_refused(
     world: motion_memory.OccupancyMap, alone: motion_memory.Memory, tmp_path: Path
 ) -> None:
     no_map: Any = world.occupied
@@ -202,9 +202,9 @@ def test_what_is_no_map_and_who_cannot_reverse_are_refused(
         alone.router(no_map)
     with pytest.raises(motion_memory.UsageError, match="tolerance_m"):
         alone.router(world, tolerance_m=-1.0)
-    forward = replace(alone, vehicle=VEHICLES["car"]._replace(min_speed=0.0))
-    with pytest.raises(motion_memory.UsageError, match="backwards"):
-        forward.router(world)
+    always_on = replace(alone, vehicle=VEHICLES["car"]._replace(min_speed=0.1))
+    with pytest.raises(motion_memory.UsageError, match="stop"):
+        always_on.router(world)
     unknown: Any = "yes"
     with pytest.raises(motion_memory.UsageError, match="unknown"):
         motion_memory.read_map(tmp_path / "no.map", unknown=unknown)

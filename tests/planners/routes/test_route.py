@@ -143,6 +143,17 @@ def test_other_vehicles_find_routes_too(vehicle: Vehicle) -> None:
     check(router.route(START, GOALS[:1]), vehicle)
 
 
+@pytest.mark.parametrize("kind", [CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER])
+def test_who_cannot_reverse_drives_forwards_all_the_way_to_a_place_behind_and_into_a_pose(
+    kind: Vehicle,
+) -> None:
+    vehicle = kind._replace(min_speed=0.0)
+    router = Router(town(), partial(searched, vehicle=vehicle), vehicle)
+    pose = Stop((20.0, 190.0), POSE_RADIUS, Arrival(-1.5, POSE_TOLERANCE, 0.0, 0.0))
+    found = check(router.route((12.0, 150.0, -1.5), [pose, GOALS[0]]), vehicle)
+    assert found.plan(vehicle).states[:, 3].min() > -1e-9
+
+
 def test_legs_begin_exactly_as_those_before_end() -> None:
     """Wheels that were straight but for 7e-7 rad counted as straight: 30 s later the plan passed a limit."""
     occupied = np.zeros((240, 240), bool)
