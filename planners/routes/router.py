@@ -15,24 +15,21 @@ from planners.current_plan import rest_of
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.maps.widest_way import Gap, middle_of, narrowest_gap
+from planners.routes.doors import Doors
 from planners.routes.leg_search import LATE, LegSearch, Solve
 from planners.routes.legs import Leg, polished_legs
 from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
-from planners.routes.stuck import NARROW, Stuck
+from planners.routes.stuck import Stuck
 from planners.search.braking import is_free_drive
 from planners.search.free_goal import lacks_room, unfolded
-from planners.world.arrays import Floats, Point, Pose
+from planners.world.arrays import Floats, Pose
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import note_free, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_START,
     GOAL_RADIUS,
-    POSE_RADIUS,
-    POSE_TOLERANCE,
-    Arrival,
     Plan,
     Problem,
     start_state,
@@ -46,10 +43,6 @@ WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that ar
 DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
 ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
 OF_OUTLINE: Final = 0.9  # of its width: who does not fill a box may get through what is narrower
-DOORS: Final = 4  # one after another that a vehicle is led through by a pose in each, if it can be ...
-DOOR_POSES: Final = 8  # ... with so many poses in all; local problems that may be tried, ...
-ATTEMPTS_INTO: Final = 3  # ... beside those for each metre of the way, to get into one of them, ...
-ATTEMPTS_ONWARD: Final = 10  # ... and to drive on from there
 
 
 class Router:
@@ -74,7 +67,6 @@ class Router:
         """
         self._world, self._vehicle, self._polishes = world, vehicle, polishes
         self._workspace = Workspace()
-        self._poses_left = 0
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
         bounds = (0.0, 0.0, *world.size)
         occupied = self._surroundings.obstacles()
@@ -83,12 +75,13 @@ class Router:
         )
         self._scene = scene_of(self._whole)
         bodies = vehicle, *trailers_of(vehicle)
-        self._widest = max(body.width for body in bodies)
+        widest = max(body.width for body in bodies)
         fits = max(_disc_inside(body) for body in bodies)
         self._paths = passable(world, fits - 2.0 * tolerance_m, CELL_M)
-        self._wider = [cache(partial(passable, world, more * self._widest, CELL_M)) for more in WIDER]
+        self._wider = [cache(partial(passable, world, more * widest, CELL_M)) for more in WIDER]
         self._wider.append(cache(self._roomy_paths))
         self._search = LegSearch(self._surroundings, self._scene, solve, vehicle, world.name)
+        self._doors = Doors(world, self._paths, self._scene, self._search, vehicle)
 
     def route(
         self,
@@ -154,7 +147,7 @@ class Router:
             goal = _goal_name(number, stops)
             if path is None:
                 why = f"{goal} cannot be reached: no way that is wide enough leads there"
-                return self._at_a_gap(
+                return self._doors.at_a_gap(
                     Stuck(stop.place, why, 0), (float(state[0]), float(state[1])), stop.place
                 )
             problems[number] = _from(state, problems[number])
@@ -167,7 +160,7 @@ class Router:
                 )
                 if more.is_late or more.to_go is None:
                     return more
-                return self._at_a_gap(more, more.place, stop.place)
+                return self._doors.at_a_gap(more, more.place, stop.place)
             if self._polishes:
                 driven = self._vehicle, self._scene, self._workspace
                 more = polished_legs(problems[number], more, *driven, until - working_clock())
@@ -242,62 +235,11 @@ class Router:
             return stuck
         legs = None
         if stuck.to_go is not None and not self._search.time_is_up():
-            self._poses_left = DOOR_POSES
-            legs = self._legs_through(ahead, state, (float(state[0]), float(state[1])), ())
+            legs = self._doors.legs_through(ahead, state)
         legs = legs or self._legs_around(path, ahead.stop, state)
         if legs is None and stuck.to_go is not None and self._search.is_late:
             return stuck._replace(why=LATE, is_late=True)
         return legs or stuck
-
-    def _legs_through(
-        self, ahead: PathAhead, state: Floats, place: Point, doors: tuple[Point, ...]
-    ) -> list[Leg] | Stuck | None:
-        """Search the legs to a stop by way of a pose in the narrowest gap behind a place, and so on.
-
-        A vehicle that is nearly as wide as a door has to be parked in it: that is a pose like one in a slot.
-
-        Args:
-            ahead: the paths to the stop.
-            state: ``[S]`` from which to drive.
-            place: there, or behind the door in which the vehicle stands.
-            doors: through which it was led so far.
-
-        Returns:
-            The legs; None if there are none, or why it is hopeless.
-        """
-        gap = self._narrow_gap(place, ahead.stop.place) if len(doors) < DOORS else None
-        if gap is None or gap.place in doors:
-            return None
-        pose = middle_of(gap, self._world)
-        if pose is None:
-            return None
-        x, y, through = pose
-        length = self._vehicle.front + self._vehicle.rear
-        behind = x + length * math.cos(through), y + length * math.sin(through)
-        off = 0.5 * (self._vehicle.front - self._vehicle.rear)  # of the middle, ahead of the reference point
-        straight = (0.0,) * len(trailers_of(self._vehicle))
-        tolerances = (POSE_TOLERANCE,) * len(straight)
-        for heading in (through, through + math.pi):
-            if self._search.time_is_up() or self._poses_left == 0:
-                break
-            place = x - off * math.cos(heading), y - off * math.sin(heading)
-            if not point_is_free(*place, self._scene):
-                continue
-            self._poses_left -= 1
-            arrival = Arrival(heading, POSE_TOLERANCE, 0.0, 0.0, straight, tolerances)
-            parked = Stop(place, POSE_RADIUS, arrival)
-            into = self._search.legs_to(
-                PathAhead(self._paths, parked, self._scene, state, briefly=True), state, ATTEMPTS_INTO
-            )
-            if isinstance(into, Stuck) or not into:
-                continue
-            inside = into[-1].end
-            onward: list[Leg] | Stuck | None = self._search.legs_to(ahead, inside, ATTEMPTS_ONWARD)
-            if isinstance(onward, Stuck) and not onward.is_enclosed:
-                onward = self._legs_through(ahead, inside, behind, (*doors, gap.place))
-            if onward is not None:
-                return onward if isinstance(onward, Stuck) else into + onward
-        return None
 
     def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | Stuck | None:
         """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain.
@@ -328,14 +270,6 @@ class Router:
         if free.all() or not free[0]:
             return "the vehicle"
         return f"trailer {int(free.argmin())}" if bodies > 2 else "the trailer"
-
-    def _at_a_gap(self, stuck: Stuck, start: Point, goal: Point) -> Stuck:
-        """Say of a search that is stuck where the widest way ahead is narrow, if it is."""
-        return stuck._replace(gap=self._narrow_gap(start, goal), width=self._widest)
-
-    def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
-        """Where the widest way is narrowest, if the vehicle hardly fits through there."""
-        return narrowest_gap(self._world, start, goal, NARROW * self._widest)
 
 
 def _from(state: Floats, problem: Problem) -> Problem:

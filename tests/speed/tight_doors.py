@@ -21,6 +21,7 @@ from rich.table import Table
 
 from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.doors import Doors
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.routes.router import Router
@@ -116,7 +117,7 @@ def report(console: Console, doors: int = 40, vehicles: tuple[str, ...] = VEHICL
         without: list[Driven] = []
         having: list[Driven] = []
         for each in asked:
-            with mock.patch.object(Router, "_legs_through", return_value=None):
+            with mock.patch.object(Doors, "legs_through", return_value=None):
                 plain = _driven(each, vehicle, workspace)
             led = _driven(each, vehicle, workspace)
             if plain is not None and led is not None:

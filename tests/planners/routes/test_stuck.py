@@ -11,11 +11,12 @@ from planners.attempt import Attempt
 from planners.maps.global_path import passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
+from planners.routes.doors import DOOR_POSES
 from planners.routes.leg_search import LegSearch
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route
-from planners.routes.router import DOOR_POSES, Router
+from planners.routes.router import Router
 from planners.routes.stuck import Stuck
 from planners.search.outcome import Status
 from planners.search.query import Limits
