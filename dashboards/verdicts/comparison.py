@@ -9,7 +9,7 @@ planning are judged. What uses no memory cannot differ: it raises an alarm inste
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ class _Measure(NamedTuple):
     of: Callable[[Panel], Floats]  # [problems, columns]
     less: str  # in words, if the other run has less
     more: str
+    may: tuple[str, str] = ("", "")  # the same where it is not shown, of what decides over less work
 
 
 def _arrival(panel: Panel) -> Floats:
@@ -54,9 +55,21 @@ def _logarithm(values: Floats) -> Floats:
     return np.log(np.maximum(values, 1e-6))
 
 
-_UNSOLVED: Final = _Measure(lambda panel: 1.0 - panel.matrix("solved"), "solves more", "solves fewer")
-_ARRIVAL: Final = _Measure(_arrival, "there sooner", "there later")
-_DRIVING: Final = _Measure(lambda panel: panel.matrix("duration_s"), "drives shorter", "drives longer")
+_UNSOLVED: Final = _Measure(
+    lambda panel: 1.0 - panel.matrix("solved"),
+    "solves more",
+    "solves fewer",
+    ("may solve more", "may solve fewer"),
+)
+_ARRIVAL: Final = _Measure(
+    _arrival, "there sooner", "there later", ("may be there sooner", "may be there later")
+)
+_DRIVING: Final = _Measure(
+    lambda panel: panel.matrix("duration_s"),
+    "drives shorter",
+    "drives longer",
+    ("may drive shorter", "may drive longer"),
+)
 _PLANNING: Final = _Measure(lambda panel: panel.milliseconds(), "plans faster", "plans slower")
 _MOSTLY: Final = _Measure(lambda panel: _logarithm(panel.milliseconds()), "mostly faster", "mostly slower")
 _CHECKS: Final = _Measure(lambda panel: panel.matrix("collision_checks"), "fewer checks", "more checks")
@@ -182,7 +195,7 @@ def _table(sides: _Sides, found: dict[_Measure, Difference], reach: _Measure) ->
             ends = [np.where(base > 0.0, ratio(each, base), np.sign(each)) for each in found[measure]]
             rows[name], rows[f"{name}_low"], rows[f"{name}_high"] = ends
     rows["sooner_s"], rows["sooner_low_s"], rows["sooner_high_s"] = found[reach]
-    later = LATER_MARGIN * sides.means(reach)[0]
+    later = LATER_MARGIN * np.minimum(*sides.means(reach))
     judged = [_judged(found, reach, i, later[i]) for i in range(len(rows))]
     for i, (_, configuration) in enumerate(sides.columns):
         if configuration.assist in WITHOUT_MEMORY:
@@ -191,24 +204,25 @@ def _table(sides: _Sides, found: dict[_Measure, Difference], reach: _Measure) ->
 
 
 def _judged(found: dict[_Measure, Difference], reach: _Measure, i: int, margin: float) -> tuple[str, str]:
-    """Verdict and reason for a column: what counts most decides."""
+    """Verdict and reason for a column: what counts most decides. The other way round it is the opposite.
 
-    def words(measures: Iterable[_Measure], less: bool) -> list[str]:
-        if less:
-            return [each.less for each in measures if found[each].low[i] > 0.0]
-        return [each.more for each in measures if found[each].high[i] < 0.0]
-
+    Less work counts only of whoever is not there later by more than a margin in seconds, nor solves fewer.
+    """
     efforts = [_PLANNING, _MOSTLY] if _PLANNING in found else list(_COUNTS)
+    solved, there = found[_UNSOLVED], found[reach]
     for decisive in ([_UNSOLVED], [reach], efforts):
-        good, bad = words(decisive, less=True), words(decisive, less=False)
-        if bad:
-            return (SAME if good else WORSE), ", ".join(good + bad)
-        if good and found[_UNSOLVED].mean[i] < 0.0:
-            return SAME, f"{', '.join(good)}; may solve fewer"
-        if good and decisive is efforts and not found[reach].low[i] >= -margin:
-            return SAME, f"{', '.join(good)}; may be {reach.more}"
-        if good:
-            return BETTER, ", ".join(good)
+        good = [each.less for each in decisive if found[each].low[i] > 0.0]
+        bad = [each.more for each in decisive if found[each].high[i] < 0.0]
+        words = ", ".join(good + bad)
+        if good and bad:
+            return SAME, words
+        if good or bad:
+            towards, sooner = (1.0, there.low[i]) if good else (-1.0, -there.high[i])
+            if towards * solved.mean[i] < 0.0:
+                return SAME, f"{words}; {_UNSOLVED.may[bool(good)]}"
+            if decisive is efforts and not sooner >= -margin:
+                return SAME, f"{words}; {reach.may[bool(good)]}"
+            return (BETTER if good else WORSE), words
     return SAME, ""
 
 

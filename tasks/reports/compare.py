@@ -46,7 +46,7 @@ class Comparison(NamedTuple):
             if len(shown):
                 yield from comparison_tables(shown)
             if len(shown) < len(rows):
-                yield f"{len(rows) - len(shown)} rows without a difference are left out; --all shows them."
+                yield f"{len(rows) - len(shown)} rows, neither better nor worse, are left out: see --all."
 
 
 def compare(

@@ -152,6 +152,23 @@ def test_whoever_may_drive_longer_by_more_than_the_margin_is_not_better(
     assert rows.loc[unclear, "why"].str.endswith("faster; may be there later").all()
 
 
+@pytest.mark.parametrize("in_turn", [True, False])
+@pytest.mark.parametrize("longer", [0.98, 1.0, 1.005, 1.02])
+def test_the_other_way_round_better_is_worse(
+    run: pd.DataFrame, closed_of_gust: pd.Series, in_turn: bool, longer: float
+) -> None:
+    """Whoever plans with less work but may be there later is as far from better as the other from worse."""
+    less = _times(run, 0.7, closed_of_gust, "planning_seconds")
+    less = _times(less, 0.7, closed_of_gust, "collision_checks")
+    noise = np.random.default_rng(3).normal(longer, 0.1, len(run))
+    less = _times(less, pd.Series(noise, run.index), closed_of_gust, "duration_s")
+    there, back = _compare(run, less, in_turn), _compare(less, run, in_turn)
+    keys = ["panel", "planner", "configuration"]
+    both = there.merge(back, on=keys, suffixes=("", "_back"))
+    mirrored = both["verdict"].replace({BETTER: WORSE, WORSE: BETTER})
+    assert mirrored.tolist() == both["verdict_back"].tolist()
+
+
 def test_solving_fewer_problems_is_worse_however_quickly(
     run: pd.DataFrame, closed_of_gust: pd.Series
 ) -> None:
