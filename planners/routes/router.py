@@ -16,6 +16,7 @@ from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.doors import Doors
+from planners.routes.free_nearby import free_nearby
 from planners.routes.leg_search import LATE, LegSearch, Solve
 from planners.routes.legs import Leg, polished_legs
 from planners.routes.path_ahead import PathAhead, Stop
@@ -194,7 +195,8 @@ class Router:
                 if self._world.holds(*start[:2])
                 else "outside the map"
             )
-            return Stuck(start[:2], f"{who} would stand {where}", 0)
+            free = free_nearby(state, self._vehicle, self._scene)
+            return Stuck(start[:2], f"{who} would stand {where}", 0, free=free)
         for number, (stop, to_stop) in enumerate(
             zip(stops, self._problems(start, stops, motion), strict=True)
         ):
@@ -203,9 +205,11 @@ class Router:
                 where = "in an obstacle" if self._world.holds(*stop.place) else "outside the map"
                 return Stuck(stop.place, f"{goal} lies {where}", 0)
             if lacks_room(to_stop, self._vehicle, self._scene):
-                who = self._blocked_body(unfolded(to_stop, self._vehicle))
+                last = unfolded(to_stop, self._vehicle)
+                who = self._blocked_body(last)
                 pose = f"the pose of {goal}" if len(stops) > 1 else "the goal pose"
-                return Stuck(stop.place, f"{who} has no room in {pose}", 0)
+                free = None if last is None else free_nearby(last, self._vehicle, self._scene)
+                return Stuck(stop.place, f"{who} has no room in {pose}", 0, free=free)
         return None
 
     def _begun(self, start: Pose, motion: tuple[float, ...]) -> Problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, NamedTuple
 
 from planners.maps.occupancy_map import OccupancyMap
@@ -22,6 +23,7 @@ class Stuck(NamedTuple):
     width: float = 0.0  # metres, of the widest body
     is_enclosed: bool = False  # whether no drive leads far out of the goal pose: then no other way helps
     is_late: bool = False  # whether the limit of time ended the search
+    free: Point | None = None  # metres: where the vehicle would have room, if that is near
 
     def told(self, world: OccupancyMap, scale: float) -> str:
         """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
@@ -30,6 +32,9 @@ class Stuck(NamedTuple):
             (width, height), (x, y, turn) = world.size, world.origin
             line += f"; the map is {width:g} by {height:g} m, from its corner at ({x:.2f}, {y:.2f})"
             line += f", turned by {turn:.2f} rad" if turn else ""
+        if self.free is not None:
+            away = scale * math.dist(self.place, self.free)
+            line += f"; {away:.2g} m away, at {_told_place(self.free, world, scale)}, it would be free"
         if self.to_go is not None:
             line += f", {scale * self.to_go:.{0 if scale * self.to_go >= 10.0 else 1}f} m before it"
         if self.gap is not None:
@@ -49,6 +54,7 @@ class Stuck(NamedTuple):
             "goal_is_enclosed": self.is_enclosed,
             "time_is_up": self.is_late,
             "place": _in_map(self.place, world, scale),
+            "free_place": None if self.free is None else _in_map(self.free, world, scale),
             "to_go_m": None if self.to_go is None else scale * self.to_go,
             "gap": gap,
             "vehicle_width_m": scale * self.width if gap else None,

@@ -176,7 +176,8 @@ def _refusal(
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     line = f"No route across {source.path.name}: {stuck.told(world, scale)}"
     if stuck.attempts == 0:
-        return UsageError(f"{line}." if stuck.is_too_narrow else f"{line}; choose another place or heading.")
+        is_told = stuck.is_too_narrow or stuck.free is not None
+        return UsageError(f"{line}." if is_told else f"{line}; choose another place or heading.")
     if stuck.is_enclosed:
         advice = "make room around it, or choose another place or heading"
     elif stuck.is_late:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -185,3 +186,24 @@ def test_who_gets_into_doors_and_no_farther_soon_gives_up(monkeypatch: pytest.Mo
     assert isinstance(Router(world, solves).route((2.0, 6.0, 0.0), [Stop((38.0, 6.0))]), Stuck)
     into = [place for briefly, place in tried if briefly]
     assert 0 < len(into) <= DOOR_POSES
+
+
+def test_who_stands_a_little_in_a_wall_is_told_where_it_would_be_free() -> None:
+    """And is refused there no more, as a start or as a goal."""
+    router, told = Router(walls([(40, 120)]), solves), 0
+    for x, y, heading in np.random.default_rng(4).uniform((0.0, 0.0, -3.0), (20.0, 16.0, 3.0), (200, 3)):
+        start = router.refusal((x, y, heading), [])
+        if start is None:
+            continue
+        assert start.attempts == 0
+        if start.free is None:
+            continue
+        told += 1
+        assert math.dist((x, y), start.free) <= 0.5 * CAR.width + 1e-9
+        assert router.refusal((*start.free, heading), []) is None
+        free_pose = Stop(start.free, 1e-3, Arrival(heading, 1e-3, 0.0, 0.0))
+        assert router.refusal((*START, 0.0), [free_pose]) is None
+        goal = router.refusal((*START, 0.0), [Stop((x, y), 1e-3, Arrival(heading, 1e-3, 0.0, 0.0))])
+        if goal is not None and "lies" not in goal.why:  # a millimetre may be enough
+            assert goal.free == start.free
+    assert told > 10
