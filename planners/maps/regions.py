@@ -32,7 +32,8 @@ def blocks_of(size: tuple[float, float], window_m: float) -> Blocks:
     if columns * rows < 2:
         raise ValueError(
             f"is {size[0]:g} x {size[1]:g} m: too small to keep places to test on apart from places to "
-            f"collect from; it takes {2 * window_m:g} m one way, so give a larger map or a smaller scale"
+            f"collect from; it takes {2 * window_m:g} m one way, so give a larger map, or a smaller scale if "
+            "the vehicle has none of its own; or drive on this map and gather what `route --learn` keeps"
         )
     return Blocks(columns, rows, size[0] / columns, size[1] / rows)
 
