@@ -7,7 +7,6 @@ left of its plan is an answer, too, and only a cheaper one replaces it.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
+from planners.world.trigonometry import all_wrapped
 from planners.world.vehicles.dynamics import control_limits, simulate, turn_limit
 from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.workspace import Workspace
@@ -84,7 +84,7 @@ def fits(current: Plan, vehicle: Vehicle) -> bool:
 def _differences(states: Floats, state: Floats) -> Floats:
     """Each of ``states [T, S]`` less a state ``[S]``; headings may differ by whole turns besides."""
     differences: Floats = states - state
-    differences[:, 2] = np.remainder(differences[:, 2] + math.pi, math.tau) - math.pi
+    differences[:, 2] = all_wrapped(differences[:, 2])
     return differences
 
 

@@ -12,6 +12,7 @@ from planners.maps.global_path import GlobalPaths, PathsTo
 from planners.world.arrays import Flags, Floats, Point
 from planners.world.geometry.collision import Scene, point_is_free
 from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival
+from planners.world.trigonometry import all_wrapped
 
 REACHES_M: Final = (60.0, 35.0, 20.0, 10.0)  # along the path to the local goals, in the order of trial
 SOUGHT_M: Final = 10.0  # before the end of a reach: so far back a place with more room is looked for
@@ -136,7 +137,8 @@ class PathAhead:
         there: Flags = self.distance(states) <= self.stop.radius
         asked = self.stop.arrival
         if asked.heading is not None:
-            there = there & (_turns(states[:, 2] - asked.heading) <= asked.heading_tolerance)
+            off = np.abs(all_wrapped(states[:, 2] - asked.heading))
+            there = there & (off <= asked.heading_tolerance)
         for i, (hitch, tolerance) in enumerate(zip(asked.hitches, asked.hitch_tolerances, strict=True)):
             there = there & (np.abs(states[:, 5 + i] - hitch) <= tolerance)
         return there
@@ -182,9 +184,3 @@ def _in_sight(place: Floats, other: Floats, scene: Scene) -> bool:
     """Whether nothing lies on the line between two points ``[2]``."""
     count = 2 + int(math.dist(place, other) / SIGHT_M)
     return all(point_is_free(x, y, scene) for x, y in np.linspace(place, other, count).tolist())
-
-
-def _turns(angles: Floats) -> Floats:
-    """How far ``angles [n]`` (radians) are from whole turns."""
-    turned: Floats = np.abs(np.remainder(angles + math.pi, math.tau) - math.pi)
-    return turned

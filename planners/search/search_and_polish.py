@@ -35,8 +35,9 @@ A_SECOND = 1000  # ... else it is improved, with so many expansions for each sec
 TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
 DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-SECOND = {"lattice": "follow"}  # who is asked as well where a planner finds nothing, or the way winds ...
-TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing
+SECOND = {"lattice": "follow"}  # who is asked as well where a planner finds nothing, or the way winds, ...
+TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing; ...
+LATE = 1.1  # ... and where a drive to a pose takes so many times as long as was expected
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
@@ -52,10 +53,11 @@ def search_and_polish(
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
-    first search took, the worse its plan mostly is, and the longer they may take. Where nothing is found, or
-    the way winds, another planner is asked as well. If the answer still takes much longer than the planner
-    expected, it is improved for as long as that is worth. A given plan may be of a worse kind than what the
-    planner finds, so it searches as if there were none, but at first not for long.
+    first search took, the worse its plan mostly is, and the longer they may take. Where nothing is found, the
+    way winds, or a drive to a pose takes longer than expected, another planner is asked as well. If the
+    answer still takes much longer than the planner expected, it is improved for as long as that is worth. A
+    given plan may be of a worse kind than what the planner finds, so it searches as if there were none, but
+    at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -125,11 +127,15 @@ def _searched_and_polished(
     until = working_clock() + query.limits.seconds
     query, vehicle = asking_for_kinds(planner, query), query.vehicle
     found, best = _first_answer(planner, query, seed, given, below_s, until)
+    expected_s = math.inf if found.expected_s is None else found.expected_s
     if planner in SECOND and query.limits.second and not query.others:
-        best = _with_second(SECOND[planner], query, seed, found.winds, best, below_s, until)
+        plan = best[0].plan
+        is_late = plan is not None and plan.duration_s > LATE * expected_s
+        is_doubtful = found.winds or (is_late and query.problem.asks_for_pose)
+        best = _with_second(SECOND[planner], query, seed, is_doubtful, best, below_s, until)
     answer, rough = best
-    plan, expected_s = answer.plan, found.expected_s
-    too_long_s = 0.0 if plan is None or expected_s is None else plan.duration_s - expected_s
+    plan = answer.plan
+    too_long_s = 0.0 if plan is None else plan.duration_s - expected_s
     if (
         plan is None
         or query.others
@@ -200,15 +206,15 @@ def _with_second(
     planner: str,
     query: Query,
     seed: int,
-    winds: bool,
+    is_doubtful: bool,
     best: tuple[Outcome, Plan | None],
     below_s: float,
     until: float,
 ) -> tuple[Outcome, Plan | None]:
-    """The cheaper of an answer and that of another planner, if the way winds or nothing was found."""
+    """The cheaper of an answer and that of another planner, if it is doubtful or nothing was found."""
     for number, times in enumerate(TRIES):
         answer, expansions = best[0], times * query.limits.expansions
-        is_worth = winds and number == 0
+        is_worth = is_doubtful and number == 0
         if answer.plan is None:
             is_worth = answer.status is Status.BUDGET_SPENT and (number == 0 or expansions <= POSE_EXPANSIONS)
         if not is_worth:

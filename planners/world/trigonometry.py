@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from planners.world.arrays import Floats
 from planners.world.jit import inlined
 
 
@@ -90,6 +93,12 @@ def angle_to(x: float, y: float) -> float:
 def wrapped(angle: float) -> float:
     """Wrap an angle (radians) to the range from -pi to pi."""
     return angle - 2.0 * math.pi * math.floor(angle * (0.5 / math.pi) + 0.5)
+
+
+def all_wrapped(angles: Floats) -> Floats:
+    """Wrap ``angles`` (radians, of any shape) to the range from -pi to pi."""
+    within: Floats = np.remainder(angles + math.pi, math.tau) - math.pi
+    return within
 
 
 @inlined

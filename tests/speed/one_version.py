@@ -37,11 +37,14 @@ WARM = 6  # problems of another seed that are solved before, so that kernels are
 def drawn(kind: str, name: str, vehicle: Vehicle, count: int, seed: int) -> list[Problem]:
     """Problems of a family (its difficulty is the name), or of a class: canonical, to places or to poses.
 
-    Of ``doors`` the name is ``place`` or ``pose``.
+    Of ``doors`` the name is ``place`` or ``pose``, of ``near`` it is ``open``.
     """
     if kind == "doors":
         rngs = (np.random.default_rng([seed, index]) for index in range(count))
         return [to_canonical(through_doors(rng, vehicle, name == "pose"))[0] for rng in rngs]
+    if kind == "near":
+        rngs = (np.random.default_rng([seed, index]) for index in range(count))
+        return [to_canonical(near_pose(rng, vehicle))[0] for rng in rngs]
     if kind not in ("canonical", "place", "pose"):
         source = family(kind, name, vehicle)
         return [to_canonical(source.draw(seed, index))[0] for index in range(count)]
@@ -79,6 +82,22 @@ def through_doors(rng: np.random.Generator, vehicle: Vehicle, pose: bool) -> Pro
         ends[1, :3] = *goal, heading
         if count_free_prefix(ends, vehicle, scene_of(problem)) == len(ends):
             return problem
+
+
+def near_pose(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
+    """To a pose half a length to six lengths away with nothing around, half of them in motion."""
+    length = vehicle.front + vehicle.rear + sum(each.hitch_length for each in trailers_of(vehicle))
+    towards, turn = rng.uniform(-math.pi, math.pi, 2)
+    metres = rng.uniform(0.5, 6.0) * length
+    goal = metres * math.cos(towards), metres * math.sin(towards)
+    speed = rng.choice((0.0, 0.0, 0.5, 1.0)) * vehicle.max_speed
+    wide = 40.0 * length
+    return Problem(
+        *("near", "near", (0.0, 0.0, 0.0), goal, 0.05 * length, (-wide, -wide, wide, wide)),
+        obstacles_of([]),
+        start_motion=(float(speed),),
+        arrival=Arrival(float(turn), 0.05, 0.0, 0.0),
+    )
 
 
 def digest_of(problem: Problem) -> str:

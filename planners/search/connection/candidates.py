@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from planners.search.connection.connection import (
     Connection,
+    chooses_pace,
     first_pose,
     heading_at,
     last_speed,
@@ -89,6 +91,9 @@ def _in_radii(start: Pose, end: Pose, radius: float) -> Pose:
     return dx * cos + dy * sin, dy * cos - dx * sin, wrapped(end[2] - start[2])
 
 
+PACES: Final = 7  # that who cannot reverse may choose from, each half as quick as the one before
+
+
 @lean
 def list_words_between(start: Pose, end: Pose, radius: float, words: Floats, vehicle: Vehicle) -> int:
     """List the words from a pose to another one that a vehicle can drive with this radius (m).
@@ -131,6 +136,27 @@ def list_connections(c: Connection, before: float, goal: Floats, top: float, veh
     for i in range(count):
         c.seconds[i] = word_seconds(c.words[i], radius, lead, before, state[3], goal, top, vehicle)
     return count
+
+
+@lean
+def best_pace(c: Connection, before: float, goal: Floats, top: float, vehicle: Vehicle) -> float:
+    """The largest speed in arcs with which a goal is reached soonest: ``top``, or less.
+
+    Few words lead forwards alone. Who cannot reverse, but turns more sharply when he is slower, is there
+    sooner so than once round a wide circle. Arguments as of ``list_connections``.
+    """
+    if not chooses_pace(vehicle):
+        return top
+    best = pace = top
+    least = math.inf
+    for k in range(PACES):
+        if k == 0 or pace >= abs(c.states[0, 3]):
+            for i in range(list_connections(c, before, goal, pace, vehicle)):
+                if c.seconds[i] < least:
+                    best = pace
+                    least = c.seconds[i]
+        pace *= 0.5
+    return best
 
 
 @inlined

@@ -94,9 +94,24 @@ def braking_seconds(state: State, top: float, vehicle: Vehicle) -> float:
 
 
 @inlined
+def radius_at(top: float, vehicle: Vehicle) -> float:
+    """The radius of the arcs of a word, in metres, if no speed is larger than ``top`` (m/s)."""
+    return float(1.0 / curvature_of(tightest_bend(top, vehicle), vehicle))
+
+
+@inlined
+def chooses_pace(vehicle: Vehicle) -> bool:
+    """Whether arcs of words may be driven slowly: by who cannot reverse, and turns more sharply then."""
+    fastest = turning_speed(vehicle)
+    return vehicle.min_speed == 0.0 and radius_at(0.5 * fastest, vehicle) < radius_at(fastest, vehicle)
+
+
+@inlined
 def straight_speed(top: float, vehicle: Vehicle) -> float:
     """The largest speed (m/s) on the straight parts of a word whose arcs are driven with up to ``top``."""
     turning = turning_speed(vehicle)
+    if turning > top and chooses_pace(vehicle):
+        return vehicle.max_speed
     if turning == vehicle.max_speed:
         return top
     return min(top * vehicle.max_speed / turning, vehicle.max_speed)
@@ -130,9 +145,3 @@ def word_speed(pace: float, goal: Floats, vehicle: Vehicle) -> float:
     if turning_speed(vehicle) < vehicle.max_speed:
         top = max(top, min(goal[LEAST_SPEED] + SHY, vehicle.max_speed))
     return top
-
-
-@inlined
-def radius_at(top: float, vehicle: Vehicle) -> float:
-    """The radius of the arcs of a word, in metres, if no speed is larger than ``top`` (m/s)."""
-    return float(1.0 / curvature_of(tightest_bend(top, vehicle), vehicle))

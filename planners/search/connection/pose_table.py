@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.search.connection.candidates import list_connections
+from planners.search.connection.candidates import best_pace, list_connections
 from planners.search.connection.connection import Connection, allocate_connection
 from planners.world.arrays import Floats, Pose
 from planners.world.goal import goal_of_pose
@@ -39,7 +39,8 @@ def _fill(table: Floats, c: Connection, goal: Floats, vehicle: Vehicle) -> None:
                 c.states[0, 1] = row * CELL - REACH_M
                 c.states[0, 2] = h * (2.0 * math.pi / HEADINGS)
                 least = NEVER
-                for i in range(list_connections(c, 0.0, goal, turning_speed(vehicle), vehicle)):
+                pace = best_pace(c, 0.0, goal, turning_speed(vehicle), vehicle)
+                for i in range(list_connections(c, 0.0, goal, pace, vehicle)):
                     least = min(least, c.seconds[i])
                 table[h, row, column] = least
 

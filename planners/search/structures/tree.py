@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import BitGenerator
 
-from planners.search.connection.candidates import list_connections, next_word
+from planners.search.connection.candidates import best_pace, list_connections, next_word
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import (
     Connection,
@@ -190,11 +190,12 @@ def connect_to_goal(
 ) -> bool:
     """Drive from a vertex to the goal as if nothing were in the way, and add the drive if it is free.
 
-    ``top`` is the largest speed in m/s.
+    ``top`` is the largest speed in m/s. Who cannot reverse may turn more slowly and sharply (``best_pace``).
     """
     c = tree.connection
     state = load(tree.states, vertex, vehicle)
     store(c.states, 0, state)
+    top = best_pace(c, tree.gears[vertex], goal, top, vehicle)
     count = list_connections(c, tree.gears[vertex], goal, top, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
     radius = radius_at(top, vehicle)

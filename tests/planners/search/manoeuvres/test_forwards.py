@@ -54,6 +54,38 @@ def test_poses_are_reached_without_reversing(name: str) -> None:
         is_driven_forwards(asked(seed, FORWARDS[name]), FORWARDS[name])
 
 
+def ramp_seconds(way: float, top: float, rate: float) -> float:
+    """From rest to rest over a ``way`` of metres or radians, as quickly as speed and acceleration allow."""
+    return 2.0 * math.sqrt(way / rate) if way <= top * top / rate else way / top + top / rate
+
+
+@pytest.mark.parametrize("turn_rate", [0.25, 0.5, 2.0, 4.0])
+@pytest.mark.parametrize("least", [0.0, -1.0])
+def test_who_can_turn_on_the_spot_is_there_nearly_as_soon_as_by_turning_driving_and_turning(
+    turn_rate: float, least: float
+) -> None:
+    """Who could not reverse drove once round a circle as wide as at full speed, to poses beside him."""
+    robot = DIFFERENTIAL_DRIVE._replace(max_turn_rate=turn_rate, min_speed=least)
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        way, towards, turn = rng.uniform(0.5, 5.0), *rng.uniform(-math.pi, math.pi, 2)
+        goal = 25.0 + way * math.cos(towards), 25.0 + way * math.sin(towards)
+        problem = replace(
+            problem_of([]),
+            start=(25.0, 25.0, 0.0),
+            goal=goal,
+            goal_radius=0.05,
+            arrival=Arrival(turn, 0.05, 0.0, 0.0),
+        )
+        plan = solve(problem, "lattice", vehicle=robot, workspace=WORKSPACE).plan
+        assert plan is not None
+        assert faults(problem, plan, robot) == []
+        turns = abs(towards), abs(math.remainder(turn - towards, math.tau))
+        seconds = ramp_seconds(way, robot.max_speed, robot.max_acceleration)
+        seconds += sum(ramp_seconds(each, turn_rate, robot.max_turn_acceleration) for each in turns)
+        assert plan.duration_s <= 1.15 * seconds + 4.0 * robot.dt
+
+
 def test_who_cannot_stand_is_not_asked_to() -> None:
     unicycle = FORWARDS["unicycle that cannot stand"]
     problem = asked(0, unicycle)
