@@ -169,3 +169,16 @@ def test_an_interval_is_given_only_where_there_are_problems_enough_for_one(probl
     reach = 1.0 - 2.0 * 0.5**problems  # how often the values of all problems reach over the true median
     assert ("95 %" in line) == (reach >= CONFIDENCE)
     assert str(problems) in line
+
+
+@pytest.mark.parametrize(("few", "many"), [(0.1, 3.0), (2.0, 0.5), (1.0, 1.0), (4.0, 4.0)])
+def test_the_line_states_planning_time_as_it_follows_from_the_means_over_all_problems(
+    few: float, many: float
+) -> None:
+    sizes = {"curves": 10, "trap": 40}
+    parts = [attempts((name,), ("gust",), WITH_MEMORY[:1], size) for name, size in sizes.items()]
+    before = pd.concat(parts, ignore_index=True)
+    after = _times(before, np.where(before["problem_class"] == "curves", few, many))
+    less = 100.0 * (1.0 - after["planning_seconds"].mean() / before["planning_seconds"].mean())
+    told = f"plans in {abs(less):.1f} % {'more' if less < 0.0 else 'less'} time over all attempts"
+    assert told in judgement_line(judge(before, after))
