@@ -38,6 +38,7 @@ from flows.run import run as run_flow
 from flows.sweep import sweep as sweep_flow
 from flows.train import train as train_flow
 from tasks.servers.access import auth_environment
+from tasks.session.ending import ended_in_one_line
 from tasks.session.folder_lock import locked_folder
 
 _KEYWORD: Final = inspect.Parameter.KEYWORD_ONLY
@@ -77,9 +78,10 @@ def _options_of(kind: type) -> list[inspect.Parameter]:
 
 def _flow_of(
     name: str, task_runner: Any, body: Callable[..., None], parameters: list[inspect.Parameter], told: str
-) -> Flow[..., None]:
+) -> Flow[..., Any]:
     """A flow whose ``body`` is called with these parameters; ``told`` is its docstring."""
 
+    @ended_in_one_line
     def deployed(**given: Any) -> None:
         body(**given)
 
@@ -115,7 +117,7 @@ def _short(value: Any) -> str:
     return Path(value).name if isinstance(value, Path) else str(value)
 
 
-def _stage(flow: Flow[..., None]) -> Flow[..., None]:
+def _stage(flow: Flow[..., None]) -> Flow[..., Any]:
     """A flow that takes settings and a data folder, with the options of a run instead of these."""
     own = [
         _parameter(each.name, each.annotation, each.default)
@@ -134,7 +136,7 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
     return _flow_of(flow.name, flow.task_runner, body, [*options, *own], _told(flow.fn, Options))
 
 
-def _command(command: Callable[..., int | None]) -> Flow[..., None]:
+def _command(command: Callable[..., int | None]) -> Flow[..., Any]:
     """A command for the user's own problems or maps as a flow; each option becomes a parameter."""
     types = get_type_hints(command)
     own: list[inspect.Parameter] = []

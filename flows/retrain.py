@@ -11,7 +11,6 @@ from flows.judge import judge
 from flows.train import train
 from tasks.champions.conclude import conclude
 from tasks.champions.new_experience import runs_to_make
-from tasks.champions.retraining_schedule import log_failure
 from tasks.fan_out.fan_out import cluster
 from tasks.registry.champion_registry import Registry
 from tasks.session.folder_lock import locked_folder
@@ -19,7 +18,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="retrain", flow_run_name="retrain {settings.title}", on_failure=[log_failure])  # type: ignore[list-item]  # meant for methods
+@flow(name="retrain", flow_run_name="retrain {settings.title}")
 def retrain(
     settings: RunSettings,
     data: str,

@@ -7,19 +7,14 @@ from pathlib import Path
 from prefect import flow
 
 from flows.gather import gather
-from tasks.champions.retraining_schedule import log_failure, log_if_scheduled
+from tasks.champions.retraining_schedule import log_if_scheduled
 from tasks.libraries.pending_library import library_retraining
 from tasks.libraries.retrain_library import RetrainedLibrary
 from tasks.libraries.retrain_library import retrain_library as task
 from tasks.requests.import_worlds import Unknown, import_settings
 
 
-@flow(
-    name="retrain-library",
-    flow_run_name="retrain-library {name}",
-    persist_result=False,
-    on_failure=[log_failure],  # type: ignore[list-item]  # meant for methods
-)
+@flow(name="retrain-library", flow_run_name="retrain-library {name}", persist_result=False)
 def retrain_library(
     name: str,
     sources: list[str],

@@ -27,6 +27,7 @@ from flows.cli import stage_commands as stages
 from flows.cli.configuration import check_configuration, configuration_file
 from flows.cli.document import Document
 from flows.cli.terminal import notices_shown, telling, to_output, write_document, write_error
+from tasks.settings.errors import one_line
 from tasks.settings.redaction import redacted
 
 FAILURE: Final = 1
@@ -149,15 +150,11 @@ def _is_wrong_use(error: Exception) -> bool:
 
 def _one_line(error: Exception) -> str:
     if isinstance(error, UnusedCliTokensError):
-        text = (
+        return redacted(
             f"too many arguments: {' '.join(error.unused_tokens or ())}; leave them out, or write their "
             "option before each, as in --worlds A --worlds B."
         )
-    elif isinstance(error, OSError) and error.strerror and error.filename is not None:
-        text = f"{error.filename} cannot be used: {error.strerror}; check the path and who may use it."
-    else:
-        text = " ".join(str(error).split())
-    return redacted(text) or type(error).__name__
+    return one_line(error)
 
 
 def _open_closed_streams() -> None:

@@ -6,6 +6,8 @@ import logging
 from collections.abc import Sequence
 from typing import Final
 
+from tasks.settings.redaction import redacted
+
 _MOST_FAULTS_TOLD: Final = 20
 _LOG = logging.getLogger(__name__)
 
@@ -16,6 +18,15 @@ class UsageError(ValueError):
 
 class RunError(RuntimeError):
     """A stage cannot continue; the message says in one line why, and what to do (exit code 1)."""
+
+
+def one_line(error: Exception) -> str:
+    """What an ``error`` tells the user: one line, without passwords and without the name of its class."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        text = f"{error.filename} cannot be used: {error.strerror}; check the path and who may use it."
+    else:
+        text = " ".join(str(error).split())
+    return redacted(text) or type(error).__name__
 
 
 def tell_faults(faults: Sequence[str]) -> None:
