@@ -73,19 +73,14 @@ def serve(
         if server is not None:
             server.wait()
             _LOG.info(str(server))
+        with locked_folder(data_path):  # nobody is at work, whatever Prefect believes
+            _end_killed(name, str(data_path))
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
         _LOG.info("retrains %s, and whenever hits have fallen; Ctrl-C ends it", when)
         try:
             _run(deployment)
         finally:
             _end_children()
-
-
-def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
-    """Log why a retraining failed, if the schedule started it; the command ``retrain`` says so itself."""
-    if flow_run.deployment_id is not None:
-        reason = " ".join(str(state.message).split())
-        _LOG.error("motion-memory: %s", reason.partition("exception: ")[2] or reason)
 
 
 def log_if_scheduled(*lines: str) -> None:
@@ -141,7 +136,11 @@ def _deployment(
     name: str,
     drifting: Mapping[str, str],
 ) -> RunnerDeployment:
-    """A deployment that retrains on the schedule, and whenever a drift event with some labels arrives."""
+    """A deployment that retrains on the schedule, and whenever a drift event with some labels arrives.
+
+    A retraining that is due while one is at work is cancelled.
+    """
+    from prefect.client.schemas.objects import ConcurrencyLimitConfig, ConcurrencyLimitStrategy
     from prefect.deployments.runner import RunnerDeployment
     from prefect.events import DeploymentEventTrigger, ResourceSpecification
     from prefect.types.entrypoint import EntrypointType
@@ -157,6 +156,9 @@ def _deployment(
             parameters=parameters,
             tags=["motion-memory", "retraining"],
             triggers=[trigger],
+            concurrency_limit=ConcurrencyLimitConfig(
+                limit=1, collision_strategy=ConcurrencyLimitStrategy.CANCEL_NEW
+            ),
             entrypoint_type=EntrypointType.MODULE_PATH,
         )
     except ValueError as error:  # how Prefect refuses a cron expression
@@ -165,6 +167,26 @@ def _deployment(
         raise _no_cron(schedule["cron"]) from error
     deployment.entrypoint = entrypoint
     return deployment
+
+
+def _end_killed(name: str, data: str) -> None:
+    """End the runs of a deployment that were killed, or Prefect would let none begin until it misses them.
+
+    Args:
+        name: of the deployment.
+        data: the data folder of these runs, which the caller has locked.
+    """
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.filters import DeploymentFilter, FlowRunFilter
+    from prefect.states import Crashed
+
+    states = ["PENDING", "RUNNING", "CANCELLING"]
+    at_work = FlowRunFilter.model_validate({"state": {"type": {"any_": states}}})
+    of_name = DeploymentFilter.model_validate({"name": {"any_": [name]}})
+    with get_client(sync_client=True) as client:
+        for each in client.read_flow_runs(flow_run_filter=at_work, deployment_filter=of_name):
+            if each.parameters.get("data") == data:
+                client.set_flow_run_state(each.id, Crashed(message="It was killed."))
 
 
 def _run(deployment: RunnerDeployment) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import socket
 import threading
@@ -19,6 +18,7 @@ READY_SECONDS: Final = (
     300.0  # for a worker to load its model, and to compile the kernels if they are not cached
 )
 STOP_SECONDS: Final = 5  # for requests that are still being answered at the end
+PARENT_SECONDS: Final = 0.2  # between two looks whether the parent is alive
 HEALTH_SECONDS: Final = 60  # a worker that does not answer for this long is replaced
 
 
@@ -55,12 +55,12 @@ def address_of(listener: socket.socket) -> str:
 
 def end_with_parent() -> None:
     """End this process when the one that started it ends, even by kill -9."""
-    parent = multiprocessing.parent_process()
+    parent = os.getppid()
 
     def wait_and_exit() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
+        while os.getppid() == parent:  # the system gives an orphan another parent at once
+            time.sleep(PARENT_SECONDS)
+        os._exit(1)
 
     threading.Thread(target=wait_and_exit, daemon=True).start()
 

@@ -14,13 +14,14 @@ from prefect.exceptions import ParameterTypeError, SignatureMismatchError
 
 from flows import deployments
 from flows.cli import choices
+from flows.cli.retraining_commands import ENTRYPOINT
 from planners.memory.encoder.encoder import NETWORKS
 from planners.memory.recall import STRATEGIES
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from tasks.champions.drift_watch import DRIFT
-from tasks.champions.retraining_schedule import as_parameter
+from tasks.champions.retraining_schedule import RUNS, _deployment, as_parameter
 from tasks.settings.presets import PRESETS, for_preset
 from tasks.settings.run_settings import CONTINUAL, Objective, RunSettings
 
@@ -166,3 +167,21 @@ def test_commands_that_name_their_input_by_its_place_run_as_deployed(
     with pytest.raises(KeyboardInterrupt):
         flow.fn(**flow.validate_parameters(given | further))
     assert str(asked[0][0]) == str(next(iter(given.values())))
+
+
+def test_what_the_schedule_starts_takes_what_the_command_gives_it() -> None:
+    from flows.cli import scheduled  # late: it shows notices from then on
+
+    own = {"sources": ["dock"], "plans": 3, "poses": 0.2, "difficulty": "easy", "vehicle": "car-1-trailer"}
+    given = {"name": "docks", "data": "data", "seed": 1, "test_problems": 3, "unknown": "free", **own}
+    assert scheduled.retrain_library.validate_parameters(given).items() >= given.items()
+    settings = for_preset("smoke")
+    given = {"settings": as_parameter(settings), "data": "data"}
+    assert scheduled.retrain.validate_parameters(given)["settings"] == settings
+
+
+def test_a_retraining_that_is_due_while_one_is_at_work_is_cancelled() -> None:
+    served = _deployment(deployments.retrain_flow, ENTRYPOINT, {"interval": 60.0}, {}, "scheduled", RUNS)
+    assert served.concurrency_limit == 1
+    assert served.concurrency_options is not None
+    assert served.concurrency_options.collision_strategy == "CANCEL_NEW"
