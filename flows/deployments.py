@@ -14,10 +14,9 @@ from dataclasses import fields
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
+from types import NoneType
+from typing import Any, Final, get_args, get_type_hints
 
-from annotated_types import Ge
 from prefect import Flow
 from prefect.utilities.callables import parameter_schema
 from pydantic_core import MISSING
@@ -25,6 +24,7 @@ from pydantic_core import MISSING
 from flows.benchmark import benchmark as benchmark_flow
 from flows.build_memory import build_memory as build_memory_flow
 from flows.cli import library_commands, map_commands, problem_commands
+from flows.cli.bounds import bounded
 from flows.cli.run_options import Options
 from flows.cli.stage_commands import settings_of
 from flows.collect import collect as collect_flow
@@ -55,19 +55,7 @@ _ABOUT: Final = (
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    bounded = _at_least(0 if name == "seed" else 1, annotation)
-    return inspect.Parameter(name, _KEYWORD, annotation=bounded, default=default)
-
-
-def _at_least(least: int, annotation: Any) -> Any:
-    """A type whose integers have a lower bound; for the command line, the settings check this."""
-    if annotation is int:
-        return Annotated[int, Ge(least)]
-    if get_origin(annotation) is list:
-        return list[_at_least(least, *get_args(annotation))]  # type: ignore[misc]  # made when it runs
-    if get_origin(annotation) is UnionType:
-        return reduce(or_, [_at_least(least, each) for each in get_args(annotation)])
-    return annotation
+    return inspect.Parameter(name, _KEYWORD, annotation=bounded(name, annotation), default=default)
 
 
 def _options_of(kind: type) -> list[inspect.Parameter]:

@@ -136,9 +136,10 @@ def serve_library(
 
 def retrain_library_flow() -> Flow[..., Any]:
     """The flow that retrains a library; Prefect reads its environment when it is imported."""
+    from flows.cli.bounds import bounded_flow
     from flows.retrain_library import retrain_library
 
-    return retrain_library
+    return bounded_flow(retrain_library)
 
 
 def _parameters(asked: LibraryRetraining, options: LibraryOptions, reading: MapOptions) -> dict[str, Any]:

@@ -69,9 +69,10 @@ def serve(
 
 def retrain_flow() -> Flow[..., None]:
     """The flow that retrains; Prefect reads its environment when it is imported."""
+    from flows.cli.bounds import bounded_flow
     from flows.retrain import retrain
 
-    return retrain
+    return bounded_flow(retrain)
 
 
 def promote(*, memory: str | None = None, data: Path | None = None) -> None:

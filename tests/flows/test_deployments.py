@@ -13,7 +13,7 @@ import yaml
 from prefect.exceptions import ParameterTypeError, SignatureMismatchError
 
 from flows import deployments
-from flows.cli import choices
+from flows.cli import choices, library_commands, retraining_commands
 from flows.cli.retraining_commands import ENTRYPOINT
 from planners.memory.encoder.encoder import NETWORKS
 from planners.memory.recall import STRATEGIES
@@ -76,6 +76,9 @@ def test_its_parameters_are_accepted_by_the_flow(deployed: list[dict[str, Any]])
         ({"experiences": -3}, "experiences"),
         ({"classes": ["curves", "maze"]}, "classes"),
         ({"experience": 3}, "experience"),
+        ({"seed": -1}, "seed"),
+        ({"channels": [8, 0]}, "channels"),
+        ({"learning_rate": 0.0}, "learning_rate"),
     ],
 )
 def test_what_the_command_refuses_is_refused_before_a_run_begins(given: dict[str, Any], refused: str) -> None:
@@ -185,3 +188,31 @@ def test_a_retraining_that_is_due_while_one_is_at_work_is_cancelled() -> None:
     assert served.concurrency_limit == 1
     assert served.concurrency_options is not None
     assert served.concurrency_options.collision_strategy == "CANCEL_NEW"
+
+
+FREE = {"start_speed", "start_steering", "start_turn_rate", "start_hitch", "goal_hitch"}  # of any sign
+BOUNDS = {"minimum", "exclusiveMinimum"}
+
+
+def _unbounded(flow: Any) -> set[str]:
+    """The numbers among the parameters of a flow for which Prefect knows no bounds."""
+    shown = {
+        name: each.get("items", each)
+        for name, parameter in flow.parameters.properties.items()
+        for each in parameter.get("anyOf", [parameter])
+        if each.get("items", each).get("type") in ("integer", "number")
+    }
+    return {name for name, each in shown.items() if not BOUNDS & set(each)}
+
+
+def test_prefect_knows_the_bounds_of_every_number(deployed: list[dict[str, Any]]) -> None:
+    served = [library_commands.retrain_library_flow(), retraining_commands.retrain_flow()]
+    for flow in [*map(_flow, deployed), *served]:
+        assert _unbounded(flow) <= FREE, flow.name
+
+
+@pytest.mark.parametrize("given", [{"poses": 1.1}, {"poses": -0.1}, {"scale": 0.0}, {"tolerance": -1.0}])
+def test_numbers_out_of_bounds_are_refused_before_a_run_begins(given: dict[str, Any]) -> None:
+    (name,) = given
+    with pytest.raises(ParameterTypeError, match=name):
+        deployments.gather.validate_parameters({"sources": ["dock"], "out": "library", **given})
