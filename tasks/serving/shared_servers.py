@@ -100,7 +100,7 @@ def password_set(folder: DataFolder) -> Iterator[str]:
     file = folder.path / "servers.auth"
     try:
         with environment(**{AUTH: new_secret(file)}):
-            yield f'export {AUTH}="$(cat {shlex.quote(str(file))})"'
+            yield f'export {AUTH}="$(cat {shlex.quote(str(file))})"; export PREFECT_API_AUTH_STRING="${AUTH}"'
     finally:
         file.unlink(missing_ok=True)
 

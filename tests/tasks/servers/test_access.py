@@ -94,7 +94,8 @@ def test_servers_without_the_setting_make_a_password_for_as_long_as_they_run(
     data = open_data_folder(tmp_path / "a data folder")
     monkeypatch.setattr("os.environ", {})
     with password_set(data) as told:
-        command = f'{told}; test "${AUTH}" = "$(cat "$1")"'
+        same = [f'test "${name}" = "$(cat "$1")"' for name in (AUTH, "PREFECT_API_AUTH_STRING")]
+        command = f"{told}; {' && '.join(same)}"
         file = data.path / "servers.auth"
         assert file.read_text() == os.environ[AUTH] == auth()
         assert subprocess.run(["sh", "-c", command, "sh", str(file)], check=True, env={"PATH": os.defpath})
