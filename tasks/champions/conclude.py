@@ -6,7 +6,7 @@ import json
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from dashboards.verdicts.drift import Usefulness, usefulness
 from dashboards.verdicts.promotion import (
@@ -40,6 +40,9 @@ from tasks.tracking.artifacts import publish_judgements
 from tasks.tracking.logbook import log_judgement
 from tasks.tracking.mlflow_runs import tracker
 from tasks.tracking.model_names import registered_name
+
+CHECKED: Final = "all its plans were checked"
+UNOPPOSED: Final = f"there was no champion, and {CHECKED}"  # why a first champion is one
 
 _LOG = logging.getLogger(__name__)
 
@@ -134,7 +137,9 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
         "benchmark": benchmark_tag(usefulness(attempts.challenger)),
         "against": "" if champion is None else champion.number,
     }
-    if judgement is not None:
+    if judgement is None:
+        tags["why"] = UNOPPOSED
+    else:
         figures = {name: f"{getattr(judgement, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
         tags |= figures | {"why": judgement.why}
     name = registered_name(memory, settings.vehicle_label)
@@ -157,7 +162,7 @@ def summary_of(version: Version, champion: Version | None, verdict: str, judgeme
     """What became of a version, in one line."""
     subject = f"{version.name} version {version.number}"
     if judgement is None or champion is None:
-        return f"{subject} is the first champion; all its plans were checked"
+        return f"{subject} is the first champion; {CHECKED}"
     state = "awaits approval (motion-memory promote)" if verdict == AWAITING else f"is {verdict}"
     return f"{subject} {state}, against version {champion.number}: {judgement.why}"
 

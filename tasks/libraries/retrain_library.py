@@ -24,7 +24,7 @@ from storage.places.mirror import remove
 from storage.places.scratch import scratch_folder
 from storage.tables.gained_experiences import gained_shards
 from storage.vehicles.vehicle_files import label_of
-from tasks.champions.conclude import benchmark_tag, settle, summary_of, verdict_on
+from tasks.champions.conclude import UNOPPOSED, benchmark_tag, settle, summary_of, verdict_on
 from tasks.champions.new_experience import note_verdict
 from tasks.fan_out.keys import key_of
 from tasks.inputs.gained_on_the_job import removed_if_it_fails, snapshot_of_questions
@@ -236,6 +236,8 @@ def _registered(
     if ours is not None:
         figures = {name: f"{getattr(ours, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
         tags |= figures | {"why": ours.why}
+    else:
+        tags["why"] = _why_without_champion(made.judgement, verdict)
     markdown = _markdown(made, verdict)
     key = key_of(made.title, logged.digest)
     version = registry.register(asked.registered, logged.run_id, logged.model_id, key, tags, markdown)
@@ -306,6 +308,12 @@ def _markdown(made: _Made, verdict: str) -> str:
         parts.append(f"{_beside(judgement)}.")
         parts.append(as_markdown([sides_table(judgement)]))
     return "\n\n".join(parts) + "\n"
+
+
+def _why_without_champion(judgement: LibraryJudgement | None, verdict: str) -> str:
+    """Why a library that met no champion is the first one, or is refused, in one line."""
+    why = HARM if verdict == REFUSED else UNOPPOSED
+    return why if judgement is None else f"{why}. {_beside(judgement)}"
 
 
 def _beside(judgement: LibraryJudgement) -> str:

@@ -28,6 +28,7 @@ from storage.tables.attempts import read_attempts
 from storage.tables.gained_experiences import snapshots
 from storage.vehicles.vehicle_files import label_of
 from storage.worlds.importing import ImportSettings
+from tasks.champions.conclude import UNOPPOSED
 from tasks.champions.drift_watch import LIBRARY, benchmarked_memory
 from tasks.champions.promote import roll_back
 from tasks.inputs.gained_on_the_job import DIGITS, Solved, question_digest, remember
@@ -121,6 +122,7 @@ def test_a_library_grows_by_what_was_learned_and_is_judged_by_what_it_never_saw(
     _timed(monkeypatch, _sooner)
     first = _retrain(data)
     assert (first.verdict, _champion(data)) == (FIRST, 1)
+    assert first.version.tag("why").startswith(f"{UNOPPOSED}. Beside the planner without a memory it ")
     assert task.retrain_library(data, ASKED) is None  # nothing new
     _learn(data, 5, 8)
     before = sorted(data.rglob("*.parquet"))
