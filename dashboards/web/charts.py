@@ -10,7 +10,7 @@ import pandas as pd
 
 from dashboards.palette import GREY
 from dashboards.statistics.embedding_plane import axis_ends
-from dashboards.web.svg import LogScale, Scale, element, linked, points, short, span, text, tooltip
+from dashboards.web.svg import Axis, LogScale, Scale, element, linked, points, short, span, text, tooltip
 from planners.world.arrays import Floats
 
 FAINT: Final = "var(--line)"  # a colour that hardly shows, on a light screen or a dark one
@@ -73,7 +73,11 @@ class Mark(NamedTuple):
 
 
 def dots(
-    title: str, rows: Sequence[Dot], axis: str, ends: tuple[float, float], ratios: bool = False
+    title: str,
+    rows: Sequence[Dot],
+    axis: str,
+    ends: tuple[float, float],
+    of_axis: type[Axis] = Scale,
 ) -> Drawing:
     """Dots with their intervals, one a row, and a line where nothing differs: at 0, or at 1 for ratios.
 
@@ -84,10 +88,10 @@ def dots(
         rows: the dots, from top to bottom.
         axis: name of the axis.
         ends: lowest and highest value on the axis.
-        ratios: whether the values are ratios, whose axis is logarithmic.
+        of_axis: the kind of axis; LogScale for ratios.
     """
-    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends, ratios)
-    same = 1.0 if ratios else 0.0
+    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends, of_axis)
+    same = 1.0 if of_axis is LogScale else 0.0
     if ends[0] < same < ends[1]:
         marks.append(element("line", x1=scale.at(same), x2=scale.at(same), y1=4.0, y2=bottom, class_="zero"))
     for i, row in enumerate(rows):
@@ -258,16 +262,15 @@ def _drawn(mark: Mark, x: float, y: float) -> str:
 
 
 def _rows_with_axis(
-    labels: Sequence[str], axis: str, ends: tuple[float, float], ratios: bool = False
-) -> tuple[Scale | LogScale, float, list[str]]:
+    labels: Sequence[str], axis: str, ends: tuple[float, float], of_axis: type[Axis] = Scale
+) -> tuple[Axis, float, list[str]]:
     """The scale beside the labels of some rows, where it lies, and its marks."""
     left = 14.0 + _LETTER * max((len(label) for label in labels), default=0)
-    of_axis: type[Scale] | type[LogScale] = LogScale if ratios else Scale
     scale, bottom = of_axis(*ends, left, WIDTH - 16.0), 8.0 + _ROW * len(labels)
     return scale, bottom, [_x_axis(scale, bottom, axis)]
 
 
-def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
+def _x_axis(scale: Axis, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
     about = max(2, int((scale.last - scale.first) / 62.0))
     marks = [element("line", x1=scale.first, x2=scale.last, y1=y, y2=y, class_="axis")]
     for value, fine in _ticks(scale, about) if ticks is None else [(each, "") for each in ticks]:
@@ -280,7 +283,7 @@ def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float
     return "".join(marks)
 
 
-def _y_axis(scale: Scale | LogScale, left: float, right: float) -> list[str]:
+def _y_axis(scale: Axis, left: float, right: float) -> list[str]:
     marks = []
     for value, fine in _ticks(scale, 4):
         y = scale.at(value)
@@ -289,7 +292,7 @@ def _y_axis(scale: Scale | LogScale, left: float, right: float) -> list[str]:
     return marks
 
 
-def _ticks(scale: Scale | LogScale, about: int) -> list[tuple[float, str]]:
+def _ticks(scale: Axis, about: int) -> list[tuple[float, str]]:
     """``about`` as many values as wanted, then those that only show in a part of the drawing, and a class."""
     shown = scale.ticks(about)
     finer = [value for value in scale.ticks(4 * about) if not np.isclose(value, shown).any()]

@@ -96,6 +96,33 @@ class LogScale(NamedTuple):
         return rare if len(shown) > about and len(rare) > 1 else shown
 
 
+class WideScale(NamedTuple):
+    """Like ``Scale`` from -100 to 100 and like ``LogScale`` beyond, for per cents that may be large."""
+
+    low: float
+    high: float
+    first: float
+    last: float
+
+    def at(self, value: float) -> float:
+        """The pixel of a ``value``; one beyond an end is put at the end."""
+        return Scale(_widened(self.low), _widened(self.high), self.first, self.last).at(_widened(value))
+
+    def ticks(self, about: int = 5) -> list[float]:
+        """0, powers of ten and then 5 and 2 times these, where their labels do not meet."""
+        largest = math.floor(math.log10(max(abs(self.low), abs(self.high), 10.0)))
+        steps = [factor * 10.0**power for factor in (1, 5, 2) for power in range(largest, -1, -1)]
+        room, shown = 0.6 * abs(self.last - self.first) / about, [0.0] if self.low <= 0.0 <= self.high else []
+        for value in (sign * step for step in steps for sign in (1.0, -1.0)):
+            is_apart = all(abs(self.at(value) - self.at(other)) >= room for other in shown)
+            if self.low <= value <= self.high and is_apart:
+                shown.append(value)
+        return sorted(shown)
+
+
+Axis = Scale | LogScale | WideScale
+
+
 def span(values: Iterable[float], margin: float = 0.05) -> tuple[float, float]:
     """Ends of an axis for ``values``, beyond them by the share ``margin`` of their range."""
     finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
@@ -110,6 +137,12 @@ def short(value: float) -> str:
         if abs(value) >= 10.0 * size or (abs(value) >= size and unit == "M"):
             return f"{value / size:.3g} {unit}"
     return f"{value:.6g}".replace("-", "−")
+
+
+def _widened(value: float) -> float:
+    """A ``value`` in hundreds, of which those beyond 1 grow like logarithms."""
+    hundreds = abs(value) / 100.0
+    return math.copysign(hundreds if hundreds <= 1.0 else 1.0 + math.log(hundreds), value)
 
 
 def _round_step(step: float) -> float:

@@ -5,24 +5,25 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 
 from dashboards.cells import panel_title, planner_title, with_interval
-from dashboards.palette import GREEN, GREY, ORANGE, VERMILLION
+from dashboards.palette import BLUE, GREEN, GREY, VERMILLION
 from dashboards.verdicts.comparison import ALARM, BETTER, SAME, WORSE, alarms, compare_runs, verdict
 from dashboards.verdicts.comparison_tables import BY_COUNTS, HEADINGS, comparison_cells
 from dashboards.web.charts import Chart, Dot, dots
 from dashboards.web.data_reader import DataReader, stamp_of
 from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
-from dashboards.web.pages.overview_page import reduction_ends
 from dashboards.web.parameters import Parameters
+from dashboards.web.svg import WideScale
 from storage.places.run_folder import RunFolder
 
 DRAWN: Final = 2000
 DRAWN_OF_MANY: Final = 500
 MANY_ROWS: Final = 100_000
-_COLOURS: Final = {BETTER: GREEN, WORSE: VERMILLION, ALARM: ORANGE}
+_COLOURS: Final = {BETTER: GREEN, WORSE: VERMILLION, ALARM: BLUE}
 
 
 def comparison(data: DataReader, params: Parameters) -> Page:
@@ -75,7 +76,7 @@ def compared(data: DataReader, one: RunFolder, two: RunFolder) -> pd.DataFrame:
 
 def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
     drawings = []
-    ends = reduction_ends(table["checks_reduction_low"])
+    ends = _ends(table)
     for (panel, planner), rows in table.groupby(["panel", "planner"], sort=False):
         title = panel_title(str(panel), str(planner))
         rows_of_panel = []
@@ -88,17 +89,26 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
             rows_of_panel.append(
                 Dot(row["configuration"], (100.0 * less, 100.0 * low, 100.0 * high), colour, words)
             )
-        drawings.append(dots(title, rows_of_panel, "fewer collision checks than the first run, %", ends))
+        axis = "fewer collision checks than the first run, %"
+        drawings.append(dots(title, rows_of_panel, axis, ends, WideScale))
     return Chart(
         "comparison",
         "How much less work the other run needs",
         f"{other} against {first}, on the problems that are in both: collision checks, which no machine "
-        "changes, with 95 % intervals that hold for all rows at once. Colours say what is better or worse by "
-        "problems solved, then seconds of driving, then checks, expansions and hits.",
+        "changes, with 95 % intervals that hold for all rows at once. Beyond 100 and −100 the axis is "
+        "logarithmic. Colours say what is better or worse by problems solved, then seconds of driving, then "
+        "checks, expansions and hits.",
         drawings,
         table,
-        [(GREEN, BETTER), (VERMILLION, WORSE), (ORANGE, ALARM), (GREY, SAME)],
+        [(GREEN, BETTER), (VERMILLION, WORSE), (BLUE, ALARM), (GREY, SAME)],
     )
+
+
+def _ends(table: pd.DataFrame) -> tuple[float, float]:
+    """Ends of an axis in per cent that holds all dots and intervals of a ``table`` of ``compare_runs``."""
+    percents = 100.0 * table[[f"checks_reduction{end}" for end in ("", "_low", "_high")]].to_numpy(float)
+    finite = percents[np.isfinite(percents)]
+    return 1.05 * float(finite.min(initial=-10.0)), 1.05 * float(finite.max(initial=100.0))
 
 
 def _different(one: dict[str, Any], two: dict[str, Any]) -> list[tuple[str, str, str]]:

@@ -27,6 +27,7 @@ from dashboards.web.data_reader import DataReader, class_names, stamp_of
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters, link
+from dashboards.web.svg import LogScale
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.configurations import BASELINE, Configuration, as_found, configurations_in
@@ -96,12 +97,6 @@ def faster_ends(rows: pd.DataFrame) -> tuple[float, float]:
     return max(0.1, min(0.8, finite[0])), max(2.0, 1.1 * finite[1])
 
 
-def reduction_ends(lows: pd.Series[float]) -> tuple[float, float]:
-    """Ends of an axis in per cent for reductions whose intervals begin at ``lows``, which are fractions."""
-    lowest = 100.0 * float(lows.min())
-    return max(-100.0, min(-10.0, lowest if lowest == lowest else -10.0)), 100.0
-
-
 def _times_faster(row: Row) -> tuple[float, float, float]:
     """How many times faster the planner of a ``row`` is with memory, and the ends of the interval."""
     return faster(row["reduction"]), faster(row["reduction_low"]), faster(row["reduction_high"])
@@ -167,7 +162,7 @@ def _reduction_chart(summary: pd.DataFrame, run: str, origin: str) -> Chart:
         "Mean planning time of the same planner without memory over that with memory, paired by problem, "
         "with 95 % bootstrap intervals; right of the line at 1 is faster. Arrows: the interval goes on. "
         f"{PLANNING_TIME} {origin}",
-        [dots(title, of_panel, "times faster", ends, ratios=True) for title, of_panel in panels],
+        [dots(title, of_panel, "times faster", ends, LogScale) for title, of_panel in panels],
         rows,
         list(legend.items()),
     )

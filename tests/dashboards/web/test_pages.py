@@ -14,6 +14,8 @@ from xml.etree import ElementTree
 import httpx
 import numpy as np
 import pandas as pd
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
 from dashboards.verdicts.comparison_words import NOT_SHOWN
@@ -35,7 +37,7 @@ from storage.tables.attempts import readable_attempts
 from storage.tables.watched import read_watched
 from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.server import served
-from tests.dashboards.web.small_data import VERSIONS, small_data, write_settings
+from tests.dashboards.web.small_data import CLASS, VERSIONS, small_data, write_settings
 
 ADDRESSES = (
     "/", "/runs/first", "/runs/first?view=solved", "/runs/first?view=time", "/runs/first/problems",
@@ -287,6 +289,19 @@ def test_a_run_stands_beside_the_one_before_it(tmp_path: Path) -> None:
     for name in ("first", "second"):
         assert "/compare?first" not in client.get(f"/runs/{name}/before").text
     assert VERSIONS[1].why in client.get("/runs/second/before").text  # how its memory was judged
+
+
+def test_each_dot_of_a_comparison_is_seen_with_its_whole_interval(tmp_path: Path) -> None:
+    data = small_data(tmp_path)
+    path = data.run("second").shard("results", CLASS, 0)
+    rows = pq.read_table(path)
+    column = rows.schema.get_field_index("collision_checks")
+    more = pc.multiply(rows["collision_checks"], 40).cast(rows.schema.field(column).type)
+    pq.write_table(rows.set_column(column, rows.schema.field(column), more), path)
+    page = LocalClient(data).get("/compare?first=first&other=second").text
+    dots = re.findall(r'<circle cx="([^"]+)"', page)
+    assert len(dots) == page.count('class="interval"') > 4
+    assert "<path d=" not in "".join(re.findall(r"<svg viewBox.*?</svg>", page, re.DOTALL))  # no arrows
 
 
 def test_live_plans_are_in_the_metres_of_their_world(client: httpx.Client) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dashboards.web.svg import LogScale
+from dashboards.web.svg import LogScale, WideScale
 
 ratios = st.floats(0.01, 1000.0)
+percents = st.floats(-1e6, 1e6)
 
 
 @given(ratios, st.floats(1.5, 1000.0), ratios, ratios)
@@ -27,3 +30,27 @@ def test_ticks_are_round_and_on_the_axis(low: float, times: float, about: int) -
     assert all(0.99 * scale.low <= tick <= 1.01 * scale.high for tick in ticks)
     assert all(f"{tick:e}"[0] in "125" for tick in ticks)
     assert len(ticks) <= max(about, 8)
+
+
+@given(st.floats(-1e6, 0.0), st.floats(100.0, 1e6), percents, percents)
+def test_a_wide_axis_keeps_the_order_of_per_cents(low: float, high: float, one: float, other: float) -> None:
+    scale = WideScale(low, high, 10.0, 300.0)
+    assert (scale.at(low), scale.at(high)) == pytest.approx((10.0, 300.0))
+    if one < other:
+        assert scale.at(one) <= scale.at(other)
+    hundred = scale.at(100.0) - scale.at(0.0)
+    assert scale.at(50.0) - scale.at(0.0) == pytest.approx(0.5 * hundred)  # even so far
+    if high > 4e4:
+        assert scale.at(4e4) - scale.at(2e4) == pytest.approx(
+            scale.at(400.0) - scale.at(200.0)
+        )  # equal ratios
+
+
+@given(st.floats(-1e6, -1.0), st.floats(1.0, 1e6), st.integers(2, 8))
+def test_ticks_of_a_wide_axis_stand_apart_around_0(low: float, high: float, about: int) -> None:
+    scale = WideScale(low, high, 10.0, 300.0)
+    ticks = scale.ticks(about)
+    assert 0.0 in ticks
+    assert all(low <= tick <= high for tick in ticks)
+    places = [scale.at(tick) for tick in ticks]
+    assert all(after - before >= 0.6 * 290.0 / about - 1e-9 for before, after in pairwise(places))
