@@ -52,10 +52,15 @@ PAGES: Final[dict[str, PageOf]] = {
     "/runs/{run}/problem": problem,
     "/runs/{run}/memory": memory,
     "/runs/{run}/try": try_it,
+    "/libraries/{library}/try": try_it,
     "/progress": progress,
     "/compare": comparison,
 }
-ANSWERS: Final[dict[str, Answer]] = {"/runs/{run}/check": check_world, "/runs/{run}/plan": plan_world}
+ANSWERS: Final[dict[str, Answer]] = {
+    f"/{base}/{name}": answer
+    for base in ("runs/{run}", "libraries/{library}")
+    for name, answer in (("check", check_world), ("plan", plan_world))
+}
 _KINDS: Final = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _FILE_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
@@ -83,7 +88,7 @@ def rendered(page: Page, status: int = 200, params: Parameters | None = None) ->
     def chart_address(name: str, kind: str) -> str:
         return params.also(**{"as": kind, "chart": name}) if params else ""
 
-    values = {"page": page, "tabs": _tabs(page.run), "chart_address": chart_address, **page.values}
+    values = {"page": page, "tabs": _tabs(page), "chart_address": chart_address, **page.values}
     html = _templates().get_template(page.template).render(values)
     return Response(html, status, media_type="text/html")
 
@@ -99,11 +104,15 @@ def _templates() -> Environment:
     )
 
 
-def _tabs(run: str) -> dict[str, str]:
-    """Addresses of the pages by name; those of a run only if one is chosen."""
-    base = f"/runs/{run}"
-    of_run = {"Overview": "", "Problems": "/problems", "Memory": "/memory", "Try it": "/try"} if run else {}
-    return {name: f"{base}{path}" for name, path in of_run.items()} | {
+def _tabs(page: Page) -> dict[str, str]:
+    """Addresses of the pages by name; those of a run or a library only if one is chosen."""
+    run, chosen = page.run, {}
+    if run:
+        chosen = {"Overview": "", "Problems": "/problems", "Memory": "/memory", "Try it": "/try"}
+    elif page.library:
+        chosen = {"Try it": "/try"}
+    base = f"/runs/{run}" if run else f"/libraries/{page.library}"
+    return {name: f"{base}{path}" for name, path in chosen.items()} | {
         "Progress": link("/progress", {"run": run}),
         "Compare": link("/compare", {"run": run, "other": run}),
     }
@@ -165,7 +174,8 @@ async def _content(request: Request) -> Any:
 
 
 def _parameters(request: Request) -> Parameters:
-    return Parameters(request.url.path, dict(request.query_params), request.path_params.get("run", ""))
+    run, library = (request.path_params.get(name, "") for name in ("run", "library"))
+    return Parameters(request.url.path, dict(request.query_params), run, library)
 
 
 def _static(request: Request) -> Response:

@@ -24,7 +24,7 @@ from planners.memory.memory import Memory
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
-from storage.archives.libraries import load_library, vehicle_of
+from storage.archives.libraries import LibraryFacts, holds_plans, library_facts, load_library
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_run
@@ -164,21 +164,33 @@ class DataReader:
         vehicle = self.vehicle(run)
         return self.kept(("memory", stamp_of(folder)), lambda: load_memory(folder, vehicle))
 
-    def libraries(self, run: RunFolder) -> list[str]:
-        """The names ``libraries/…`` of the data folder's libraries for the vehicle of a ``run``."""
-        vehicle, names = self.vehicle(run), []
+    def libraries(self) -> tuple[dict[str, LibraryFacts], list[str]]:
+        """The data folder's libraries by the names of their folders, and why others cannot be read."""
+        facts, faults = {}, []
         for folder in folders_in(self.folder.libraries):
-            with suppress(StorageError):  # no library, or one of another version
-                if NAME.fullmatch(folder.name) and vehicle_of(folder) == vehicle:
-                    names.append(f"{self.folder.libraries.name}/{folder.name}")
-        return names
+            try:
+                if NAME.fullmatch(folder.name):
+                    facts[folder.name] = library_facts(folder)
+            except StorageError as error:
+                faults += [str(error)] if holds_plans(folder) else []
+        return facts, faults
+
+    def libraries_for(self, vehicle: Vehicle) -> list[str]:
+        """The names ``libraries/…`` of the data folder's libraries for a ``vehicle``."""
+        base, (facts, _) = self.folder.libraries.name, self.libraries()
+        return [f"{base}/{name}" for name, each in facts.items() if each.vehicle == vehicle]
+
+    def library(self, vehicle: Vehicle, name: str) -> PlanLibrary:
+        """The library ``libraries/…`` for a ``vehicle``. Raises MissingError if there is none."""
+        if name not in self.libraries_for(vehicle):
+            raise MissingError(f"There is no library {name[:60]!r} for this vehicle in {self.folder.path}.")
+        folder = self.folder.path / name
+        return self.kept(("library", stamp_of(folder)), lambda: load_library(folder, vehicle))
 
     def memory_or_library(self, run: RunFolder, name: str) -> Memory | PlanLibrary:
         """The memory of that ``name`` of a ``run``, or the library. Raises MissingError if there is none."""
-        if name not in self.libraries(run):
-            return self.memory(run, name)
-        folder, vehicle = self.folder.path / name, self.vehicle(run)
-        return self.kept(("library", stamp_of(folder)), lambda: load_library(folder, vehicle))
+        vehicle = self.vehicle(run)
+        return self.library(vehicle, name) if name in self.libraries_for(vehicle) else self.memory(run, name)
 
     def problem(self, run: RunFolder, class_name: str, identity: str) -> Problem:
         """The problem with the id ``identity``: drawn again, or looked up among the worlds of a ``run``."""

@@ -23,6 +23,7 @@ class Page:
     run: str = ""
     values: Mapping[str, Any] = field(default_factory=dict)
     charts: Sequence[Chart] = ()
+    library: str = ""  # that the page is of, if it is not of a run
 
 
 PageOf = Callable[["DataReader", "Parameters"], Page]  # from the data and what the address asks for

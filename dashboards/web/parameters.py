@@ -19,6 +19,7 @@ class Parameters:
     path: str
     values: Mapping[str, str]
     run: str = ""  # that the path names, if it does
+    library: str = ""  # that the path names, if it does
 
     def text(self, name: str, default: str = "") -> str:
         """The parameter ``name``, a short printable text; ``default`` if it is missing or empty."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,15 @@ _HEADER: Final = f"{_KIND}.json"
 _KINDS: Final = ("memory", _KIND)
 HEADERS: Final = tuple(f"{kind}.json" for kind in _KINDS)  # one is in the folder of a memory, of a library
 _DRIFT: Final = 1e-6  # metres and radians by which states may differ from the simulated controls
+
+
+class LibraryFacts(NamedTuple):
+    """What a library says of itself, without its plans."""
+
+    class_name: str  # of the questions
+    questions: tuple[str, ...]  # [N] the id of the question that each plan answered
+    scales: tuple[float, ...]  # of the questions: real metres in one metre of a plan
+    vehicle: Vehicle
 
 
 def holds_plans(folder: Path) -> bool:
@@ -71,16 +80,22 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
             raise ValueError(f"missing or too many: {', '.join(sorted(files.keys() ^ PLAN_FILES))}")
         plans = plans_in(files, vehicle)
         _check_driven(plans, vehicle)
-        return PlanLibrary(
-            checked_name(text_of(header["class"], "class")),
-            vehicle,
-            plans,
-            _texts(header["questions"]),
-            _scales(header["scales"]),
-        )
+        facts = _facts(header, vehicle)
+        return PlanLibrary(facts.class_name, vehicle, plans, facts.questions, facts.scales)
     except (KeyError, TypeError, ValueError, StorageError) as error:
-        reason = str(error).rstrip(".")
-        raise StorageError(f"{folder} is not a complete library ({reason}); gather it again.") from None
+        raise _incomplete(folder, error) from None
+
+
+def library_facts(folder: Path) -> LibraryFacts:
+    """What the library in a ``folder`` says of itself; its plans are not looked at.
+
+    Raises StorageError if its header is missing or damaged or has another version.
+    """
+    vehicle = archived_vehicle(folder, _KIND)
+    try:
+        return _facts(read_header(folder, _KIND), vehicle)
+    except (KeyError, TypeError, ValueError) as error:
+        raise _incomplete(folder, error) from None
 
 
 def vehicle_of(folder: Path) -> Vehicle:
@@ -100,6 +115,16 @@ def _check_driven(plans: StoredPlans, vehicle: Vehicle) -> None:
         driven = simulate(plan.states[0], plan.controls, vehicle)
         if not np.abs(driven - plan.states).max() <= _DRIFT:
             raise ValueError(f"the controls of its plan {number} do not lead through its states")
+
+
+def _facts(header: dict[str, Any], vehicle: Vehicle) -> LibraryFacts:
+    class_name = checked_name(text_of(header["class"], "class"))
+    return LibraryFacts(class_name, _texts(header["questions"]), _scales(header["scales"]), vehicle)
+
+
+def _incomplete(folder: Path, error: Exception) -> StorageError:
+    reason = str(error).rstrip(".")
+    return StorageError(f"{folder} is not a complete library ({reason}); gather it again.")
 
 
 def _texts(value: object) -> tuple[str, ...]:

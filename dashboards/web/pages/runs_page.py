@@ -1,4 +1,4 @@
-"""The runs of the data folder, the newest first; an empty folder says what to do."""
+"""The runs of the data folder, the newest first, and its libraries; an empty folder says what to do."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from dashboards.web.data_reader import DataReader, class_names
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters
 from planners.world.vehicles.vehicle import name_of
+from storage.archives.libraries import LibraryFacts
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
 from storage.tables.configurations import as_found
 
 
 def runs(data: DataReader, params: Parameters) -> Page:
-    """Every run with its settings and how far it is; one that cannot be read says why."""
-    found = data.runs()
+    """Every run with its settings and how far it is, and every library; what cannot be read says why."""
+    found, (libraries, faults) = data.runs(), data.libraries()
     values = {
         "rows": [_row(data, run) for run in found],
         "data": str(data.folder.path),
         "newest": found[0].path.name if found else "",
+        "libraries": [_row_of_library(name, facts) for name, facts in libraries.items()],
+        "faults": faults,
     }
     return Page("runs.html.jinja", "Runs", values=values)
 
@@ -48,6 +51,14 @@ def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
         "vehicle": vehicle,
         "state": _state(run, stages),
     }
+
+
+def _row_of_library(name: str, facts: LibraryFacts) -> dict[str, Any]:
+    return {
+        "name": name, "address": f"/libraries/{name}/try", "vehicle": name_of(facts.vehicle),
+        "plans": f"{len(facts.questions):,}", "questions": f"{len(set(facts.questions)):,}",
+        "class": facts.class_name, "scales": ", ".join(f"{scale:g}" for scale in facts.scales),
+    }  # fmt: skip
 
 
 def _result(data: DataReader, run: RunFolder) -> str:

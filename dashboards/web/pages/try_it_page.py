@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
 
+from dashboards.web.bench import bench_of
 from dashboards.web.data_reader import DataReader
 from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
@@ -21,8 +23,7 @@ from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Floats
-from planners.world.classes.families import class_or_family, families_of
-from planners.world.classes.problem_classes import CLASSES
+from planners.world.classes.families import class_or_family
 from planners.world.driving_cost import runs_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
@@ -44,33 +45,27 @@ _WARM: Final[set[tuple[str, str, Vehicle, bool, bool]]] = set()
 
 
 def try_it(data: DataReader, params: Parameters) -> Page:
-    """The editor with a problem of the run, or a fresh one of a class or a family of manoeuvres."""
-    run = data.run(params.run)
-    settings, vehicle = data.settings(run), data.vehicle(run)
-    names = [*run.memory_names(), *data.libraries(run)]
-    classes = [name for name in settings["classes"] if name in CLASSES]
-    class_name = params.text("class", classes[0] if classes else "random")
-    drawable = (*CLASSES, *families_of(vehicle))
+    """The editor with a problem of a run, or a fresh one of a class or a family of manoeuvres."""
+    bench = bench_of(data, params)
+    vehicle, names = bench.vehicle, bench.names
+    class_name = params.text("class", bench.first)
     identity, index = params.text("problem"), params.number("index", 0, 10**9, 0)
     if identity:
-        problem = data.problem(run, class_name, identity)
-    elif class_name in drawable:
-        difficulty, seed = (
-            str(settings.get("difficulty", "standard")),
-            params.number("seed", 0, 10**9, 10**6),
-        )
+        problem = bench.problem(class_name, identity)
+    elif class_name in bench.drawable:
+        seed = params.number("seed", 0, 10**9, 10**6)
         try:
-            problem = class_or_family(class_name, difficulty, vehicle).draw(seed, index)
+            problem = class_or_family(class_name, bench.difficulty, vehicle).draw(seed, index)
         except ValueError as error:
             raise BadRequestError(str(error)) from None
     else:
         raise BadRequestError(f"{class_name[:60]!r} is no class that can be drawn; name a problem of it.")
-    memory = params.one_of("memory", names, class_name if class_name in names else (names or [""])[0])
+    memory = params.one_of("memory", names, class_name if class_name in names else (*names, "")[0])
     planner = params.one_of("planner", tuple(PLANNERS), "lattice")
     assist = params.one_of("assist", ASSISTS, "repair")
     values: dict[str, Any] = {
         "menus": [
-            menu("class", "Fresh world of", drawable, class_name),
+            menu("class", "Fresh world of", bench.drawable, class_name),
             menu("memory", "Memory", names, memory),
             menu("planner", "Planner", tuple(PLANNERS), planner),
             menu("assist", "Use of memory", ASSISTS, assist),
@@ -82,20 +77,20 @@ def try_it(data: DataReader, params: Parameters) -> Page:
         "limits": {"obstacles": MOST_OBSTACLES},
         "seconds": MOST_SECONDS,
     }
-    return Page("try_it.html.jinja", "Try it", "Try it", params.run, values)
+    return Page("try_it.html.jinja", "Try it", "Try it", params.run, values, library=params.library)
 
 
 def check_world(data: DataReader, params: Parameters, content: Any) -> dict[str, Any]:
     """A world of one's own in ``content``, checked and in its own frame, as the editor takes it."""
-    vehicle = data.vehicle(data.run(params.run))
+    vehicle = bench_of(data, params).vehicle
     problem = _problem(content, vehicle)
     return {"world": fields_of(problem, vehicle), "start": _at_start(problem, vehicle)}
 
 
 def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, Any]:
     """Plans without memory, and with it if there is one, for ``{"world", "planner", "assist", "memory"}``."""
-    run = data.run(params.run)
-    vehicle = data.vehicle(run)
+    bench = bench_of(data, params)
+    vehicle = bench.vehicle
     if not isinstance(content, dict):
         raise BadRequestError(f"Send an object with {', '.join(CHOICES)} and world.")
     try:
@@ -103,11 +98,11 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
         texts = {name: text_of(content[name], name) for name in CHOICES if name in content}
     except ValueError as error:
         raise BadRequestError(ended(f"What was sent: {error}")) from None
-    choices = Parameters(params.path, texts, params.run)
+    choices = replace(params, values=texts)
     planner = choices.one_of("planner", tuple(PLANNERS), "lattice")
     assist = choices.one_of("assist", ASSISTS, "repair")
     name = choices.text("memory")
-    memory = data.memory_or_library(run, name) if name else None
+    memory = bench.memory(name) if name else None
     problem = _problem(content.get("world"), vehicle)
     canonical, alignment = to_canonical(problem)
     fault = scale_fault(memory, problem.scale) if memory is not None else None
