@@ -7,13 +7,15 @@ import re
 import pandas as pd
 import pytest
 
-from dashboards.cells import CellTable
+from dashboards.cells import CellTable, count, decimal, percent
 from dashboards.report.retrieval_tables import retrieval_markdown, retrieval_table
 from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
+    SOURCES,
     as_csv,
     experience_table,
+    full_cells,
     summary_markdown,
     summary_tables,
 )
@@ -91,6 +93,31 @@ def test_what_was_not_attempted_is_seen_to_be_missing(attempt_rows: pd.DataFrame
     open_rows = [line for line in trap if "| open" in line]
     assert len(open_rows) == 9
     assert all(line.count(NOTHING) == len(FULL_HEADINGS) - 2 for line in open_rows)
+
+
+def test_what_readers_look_for_first_stands_before_what_a_narrow_page_cuts() -> None:
+    first = [heading.partition(" [")[0] for heading in FULL_HEADINGS[2:8]]
+    assert first == [
+        "solved %",
+        "mean ms",
+        "reduction of the mean %",
+        "driving s",
+        "sooner s",
+        "hits %",
+    ]
+
+
+def test_figures_stand_under_their_headings(attempt_rows: pd.DataFrame) -> None:
+    row = summarise(attempt_rows, resamples=10).query("assist != 'none'").iloc[0]
+    cells = dict(zip(FULL_HEADINGS[2:], full_cells(row, 2), strict=True))
+    for heading, name in (("solved %", "solved"), ("slower %", "slower"), ("hits %", "hit")):
+        assert cells[heading] == percent(row[name])
+    for heading, name in (("mean ms [95 %]", "mean_ms"), ("median ms [95 %]", "median_ms")):
+        assert cells[heading].startswith(f"{row[name]:,.2f} [")
+    assert cells["driving s"] == decimal(row["driving_s"], 1)
+    assert cells["collision checks"] == count(row["collision_checks"])
+    for source in SOURCES:
+        assert cells[f"{source} %"] == percent(row[source])
 
 
 def test_markdown_columns_are_aligned(attempt_rows: pd.DataFrame, recall_rows: pd.DataFrame) -> None:
