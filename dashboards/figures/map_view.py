@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,8 +14,8 @@ from matplotlib.patches import Circle, Patch
 
 from dashboards.figures.map_picture import draw_map
 from dashboards.figures.style import new_figure
+from dashboards.figures.views import View, view_of
 from dashboards.palette import GREEN, INK
-from dashboards.world_outlines import footprint_spacing_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.world.arrays import Floats, Pose
@@ -26,40 +26,18 @@ CLOSE_UP_LENGTHS: Final = 2.5  # of the vehicle to each side of the place
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
 _CLOSE_UPS: Final = 3  # side by side, at most
-_MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
-_AROUND: Final = 2.5  # ... and at least so many lengths of the vehicle
-_MOST_OF_MAP: Final = 0.7  # of a side: if that is more, all of the side is shown
+_AROUND: Final = 2.5  # lengths of the vehicle around what is driven, at least
 _SEEN: Final = 0.018  # of the longer side of what is shown: smaller discs lie under the mark of the goal
 _DISC: Final[dict[str, Any]] = {"facecolor": "#DDF2E9", "edgecolor": GREEN, "linewidth": 0.8}
 _ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
 
 
-class View(NamedTuple):
-    """What of a map is shown, in metres of its frame."""
-
-    left: float
-    bottom: float
-    right: float
-    top: float
-
-    @property
-    def longest(self) -> float:
-        """The longer side."""
-        return max(self.right - self.left, self.top - self.bottom)
-
-
 def view_around(world: OccupancyMap, places: Sequence[Floats], scale: float, vehicle: Vehicle) -> View:
-    """What lies around all ``places [n, 2]``, canonical metres; a whole side if that is most of it."""
+    """What of a map lies around all ``places [n, 2]``, which are in canonical metres."""
     width, height = world.size
     corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    shown = np.clip(placed(world, scale * np.concatenate(places)), low, high)
-    first, last = shown.min(axis=0), shown.max(axis=0)
-    around = max(_MARGIN * float((last - first).max()), _AROUND * scale * footprint_spacing_m(vehicle))
-    first, last = np.maximum(first - around, low), np.minimum(last + around, high)
-    wide = last - first > _MOST_OF_MAP * (high - low)
-    first, last = np.where(wide, low, first), np.where(wide, high, last)
-    return View(*first.tolist(), *last.tolist())
+    whole = (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+    return view_of([placed(world, scale * np.concatenate(places))], whole, vehicle, _AROUND, scale)
 
 
 def figure_over(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, draw_way, manoeuvre_legend, way_legend
 from dashboards.figures.marks import draw_scale_bar
 from dashboards.figures.style import legend_below, message_figure, new_figure
+from dashboards.figures.views import View, view_of
 from dashboards.palette import GREY, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
     CheckedPlan,
@@ -33,6 +35,10 @@ from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 _ON_ITS_WAY: Final[dict[str, Any]] = {"facecolor": (SKY, 0.28), "edgecolor": GREY, "linewidth": 0.8}
+_EDGE: Final[dict[str, Any]] = {
+    "fill": False, "edgecolor": GREY, "linewidth": 0.8, "linestyle": (0, (4, 3)), "zorder": 0.4
+}  # fmt: skip
+_AROUND: Final = 1.5  # lengths of the vehicle around what is driven, at least
 _MOVED: Final[dict[str, Any]] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (5, 2))}
 
 
@@ -49,11 +55,23 @@ class Example(NamedTuple):
     moved: Plan | None = None  # a stored drive as it was before it was moved and became the answer
 
 
-def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: str = OBSTACLE) -> None:
-    """Draw bounds, obstacles and goal of ``problem``, the ``vehicle`` at its start, and a scale in metres.
+def draw_problem(
+    axes: Axes,
+    problem: Problem,
+    vehicle: Vehicle = CAR,
+    colour: str = OBSTACLE,
+    view: View | None = None,
+) -> None:
+    """Draw bounds, obstacles and goal of a problem, the vehicle at its start, and a scale in metres.
 
-    Obstacles are drawn in a ``colour``, a goal pose as an outline of the vehicle, a speed at the start as the
-    way of one second.
+    A goal pose is drawn as an outline of the vehicle, a speed at the start as the way of one second.
+
+    Args:
+        axes: where to draw, in metres of the problem.
+        problem: the problem.
+        vehicle: the vehicle that drives.
+        colour: of obstacles.
+        view: what of the bounds is shown; None for all.
     """
     x_min, y_min, x_max, y_max = problem.bounds
     frame = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min, fill=False, edgecolor=INK, linewidth=1.2)
@@ -61,7 +79,10 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: s
     # The edge closes the seams between the convex pieces of one obstacle.
     pieces = PolyCollection(problem.obstacles.pieces(), facecolor=colour, edgecolor=colour, linewidth=0.3)
     axes.add_collection(pieces)
-    pieces.set_clip_path(frame)
+    view = view or View(*problem.bounds)
+    edge = Rectangle(view[:2], view.right - view.left, view.top - view.bottom, **_EDGE)
+    axes.add_patch(edge)  # below the frame, which hides it where both are the same
+    pieces.set_clip_path(edge)
     asked = asked_pose(problem.goal, problem.arrival, vehicle)
     if asked is None:
         disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
@@ -71,7 +92,7 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: s
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=5)
     start = problem.start[:2]
-    shown = [(x_min, y_min), (x_max, y_max)]
+    shown = [view[:2], view[2:]]
     for root, tip, colour, width in (
         (start, heading_tip(problem, vehicle), INK, 1.4),
         (problem.goal, goal_tip(problem, vehicle), ORANGE, 1.4),
@@ -81,13 +102,13 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: s
             arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width}
             axes.annotate("", tip, root, arrowprops=arrow, zorder=6)
             shown.append(tip)  # beyond the bounds if it faces them: no arrow is drawn whose tip is not shown
-    margin = 0.015 * (x_max - x_min)
+    margin = 0.015 * (view.right - view.left)
     (left, lower), (right, upper) = np.min(shown, axis=0) - margin, np.max(shown, axis=0) + margin
     axes.set_xlim(left, right)
     axes.set_ylim(lower, upper)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    draw_scale_bar(axes, problem)
+    draw_scale_bar(axes, replace(problem, bounds=view))
 
 
 def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
@@ -123,7 +144,7 @@ def gallery(examples: Sequence[Example], title: str = "Recalled, repaired and fo
         return message_figure(title, "No problems to show: run the benchmark first.")
     columns = 2 if len(examples) == 4 else min(3, len(examples))
     rows = math.ceil(len(examples) / columns)
-    shares = [_height_share(example.problem) for example in examples]
+    shares = [_height_share(_view(example)) for example in examples]
     tallest = [max(shares[i : i + columns]) for i in range(0, len(shares), columns)]  # of each row
     figure = new_figure(max(6.4, 3.8 * columns), 3.85 * sum(tallest) + 0.9, title)
     grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"height_ratios": tallest}).ravel()
@@ -166,7 +187,7 @@ def picture(
         moved: a stored drive as it was before it was moved and became the answer.
     """
     example = Example(problem, recalled, answer, caption, vehicle, collisions, moved=moved)
-    figure = new_figure(6.4, 1.2 + 6.0 * _height_share(problem), problem.id or "Problem")
+    figure = new_figure(6.4, 1.2 + 6.0 * _height_share(_view(example)), problem.id or "Problem")
     _draw_example(figure.add_subplot(), example)
     legend_below(figure, _legend([example], called), 3)
     return figure
@@ -182,7 +203,8 @@ def _draw_bodies(axes: Axes, states: Floats, vehicle: Vehicle, **style: Any) -> 
 
 
 def _draw_example(axes: Axes, example: Example) -> None:
-    draw_problem(axes, example.problem, example.vehicle)
+    view = _view(example)
+    draw_problem(axes, example.problem, example.vehicle, view=view)
     scene = scene_of(example.problem)
     if example.answer is not None and _is_pose(example):
         draw_manoeuvre(axes, example.answer, example.vehicle)
@@ -194,6 +216,7 @@ def _draw_example(axes: Axes, example: Example) -> None:
         axes.plot(*example.moved.states[:, :2].T, **_MOVED, zorder=6)
     failed = example.answer is None and not example.asked_only
     title = f"{example.caption}, no plan found" if failed else example.caption
+    title += _part_told(view, example.problem)
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
 
 
@@ -202,10 +225,29 @@ def _is_pose(example: Example) -> bool:
     return goal_tip(example.problem, example.vehicle) is not None
 
 
-def _height_share(problem: Problem) -> float:
-    """How high the bounds are beside their width, as far as a picture of them should be."""
-    x_min, y_min, x_max, y_max = problem.bounds
-    return min(max((y_max - y_min) / (x_max - x_min), 0.35), 1.0)
+def _view(example: Example) -> View:
+    """What of the bounds is shown: what lies around the drive, or all of them if there is none."""
+    problem = example.problem
+    if example.answer is None:
+        return View(*problem.bounds)
+    plans = [each for each in (example.answer, *example.recalled, example.moved) if each is not None]
+    goal = np.array([problem.goal]) + problem.goal_radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
+    places = [np.array([problem.start[:2]]), goal, *(plan.states[:, :2] for plan in plans)]
+    return view_of(places, problem.bounds, example.vehicle, _AROUND)
+
+
+def _part_told(view: View, problem: Problem) -> str:
+    """A line that says how much is shown, in real metres; empty if it is all."""
+    part, whole = (
+        f"{problem.scale * (right - left):.3g} × {problem.scale * (top - bottom):.3g}"
+        for left, bottom, right, top in (view, problem.bounds)
+    )
+    return "" if view == problem.bounds else f"\nshown: {part} of {whole} m"
+
+
+def _height_share(view: View) -> float:
+    """How high a view is beside its width, as far as a picture of it should be."""
+    return min(max((view.top - view.bottom) / (view.right - view.left), 0.35), 1.0)
 
 
 def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:

@@ -134,6 +134,32 @@ def test_every_body_is_drawn_and_every_trailer_hangs_on_the_body_before(vehicle:
         assert hitch == pytest.approx(plan.states[0, :2], abs=1e-9)
 
 
+@given(st.floats(-1.0, 1.0), st.floats(5.0, 8.0), st.sampled_from([1.0, 0.1]))
+def test_of_wide_bounds_what_lies_around_the_drive_is_shown(turn: float, speed: float, scale: float) -> None:
+    controls = np.zeros((30, 2))
+    controls[:10, 1] = turn
+    wide = replace(problem(WALL), bounds=(-200.0, -300.0, 400.0, 500.0), scale=scale)
+    begun = replace(wide, start_motion=(speed,))
+    plan = Plan(simulate(start_state(begun), controls, CAR), controls)
+    near = replace(begun, goal=tuple(plan.states[-1, :2].tolist()))
+    drawn, none = (picture(near, each, "told").axes[0] for each in (plan, None))
+    for place in plan.states[:, :2]:
+        assert drawn.viewLim.contains(*(place - CAR.front))
+        assert drawn.viewLim.contains(*(place + CAR.front))
+    assert drawn.viewLim.width < 150.0
+    shown = drawn.get_title().splitlines()[1]
+    assert shown.endswith(f"of {600 * scale:.3g} × {800 * scale:.3g} m")
+    assert none.viewLim.width > 600.0  # where no plan was found, the way may lead anywhere
+    assert "shown" not in none.get_title()
+
+
+def test_of_bounds_that_are_mostly_driven_through_all_is_shown(straight: Plan) -> None:
+    axes = picture(problem(WALL), straight, "told").axes[0]
+    assert axes.get_title() == "told"
+    assert axes.viewLim.contains(*BOUNDS[:2])
+    assert axes.viewLim.contains(*BOUNDS[2:])
+
+
 @pytest.mark.parametrize("count", [1, 2, 4, 6])
 def test_a_gallery_shows_every_example(count: int, straight: Plan) -> None:
     figure = gallery([Example(problem(WALL), [straight], None, f"caption {i}") for i in range(count)])
