@@ -18,6 +18,7 @@ GREY: Final = "#8C8C8C"
 INK: Final = "#222222"
 PALE: Final = "#E4E4E4"
 OBSTACLE: Final = "#6B7280"
+UNKNOWN: Final = "#F1DFB8"  # cells of a map that nobody has seen
 
 SERIES: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, YELLOW)  # of planners, of plans, …
 TIME_COLOURS: Final = dict(

@@ -17,7 +17,7 @@ from matplotlib.transforms import Affine2D
 
 from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below, new_figure
-from dashboards.palette import BLUE, INK, OBSTACLE, ORANGE
+from dashboards.palette import BLUE, INK, OBSTACLE, ORANGE, UNKNOWN
 from planners.maps.cutting import Cut
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Blocks, blocks_of
@@ -57,7 +57,7 @@ def map_picture(
         draw_problem(beside, shown, vehicle)
         beside.set_title(shown.id, fontsize=9, color=COLOURS[part], pad=4)
     handles: list[Line2D | Patch] = [
-        Patch(facecolor=OBSTACLE, label="occupied"),
+        *cells_legend(world),
         *(Patch(facecolor=COLOURS[part], alpha=0.15, label=f"blocks of {part}") for part in COLOURS),
         *(
             Line2D([], [], color=COLOURS[part], label=f"{len(cuts[part]):,} starts of {part}, some windows")
@@ -69,14 +69,22 @@ def map_picture(
 
 
 def draw_map(axes: Axes, world: OccupancyMap, colour: str = OBSTACLE) -> None:
-    """Draw what is occupied in ``world`` on axes in metres of the map's frame, in a ``colour``."""
+    """Draw what is occupied in ``world`` on axes in metres of the map's frame, in a ``colour``.
+
+    Cells that are only occupied because nobody has seen them have a colour of their own.
+    """
     width, height = world.size
-    picture = np.ma.masked_equal(world.occupied, False)
+    kinds = world.occupied.astype(np.int8)
+    if world.unknown is not None:
+        kinds[world.unknown] = 2
+    picture = np.ma.masked_equal(kinds, 0)
     axes.imshow(
         picture,
         origin="lower",
         extent=(0.0, width, 0.0, height),
-        cmap=ListedColormap([colour]),
+        cmap=ListedColormap([colour, UNKNOWN]),
+        vmin=1,
+        vmax=2,
         interpolation="nearest",
         transform=_frame(world) + axes.transData,
         zorder=1,
@@ -88,6 +96,13 @@ def draw_map(axes: Axes, world: OccupancyMap, colour: str = OBSTACLE) -> None:
     axes.tick_params(labelsize=8, colors=INK)
     axes.set_xlabel("x, m", fontsize=9)
     axes.set_ylabel("y, m", fontsize=9)
+
+
+def cells_legend(world: OccupancyMap, colour: str = OBSTACLE) -> list[Line2D | Patch]:
+    """What a legend says of the cells that ``draw_map`` draws."""
+    has_unknown = world.unknown is not None and world.unknown.any()
+    unknown = [Patch(facecolor=UNKNOWN, label="unknown, counts as occupied")] if has_unknown else []
+    return [Patch(facecolor=colour, label="occupied"), *unknown]
 
 
 def _frame(world: OccupancyMap) -> Affine2D:

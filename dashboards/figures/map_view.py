@@ -59,16 +59,33 @@ def figure_over(
 
 
 def draw_ends(
-    axes: Axes, world: OccupancyMap, start: Pose, stops: Sequence[Stop], scale: float, longest: float
+    axes: Axes,
+    world: OccupancyMap,
+    start: Pose,
+    motion: tuple[float, ...],
+    stops: Sequence[Stop],
+    scale: float,
+    longest: float,
 ) -> list[Line2D | Patch]:
-    """Draw the start and the goals; returns what a legend says of them."""
-    several, discs = len(stops) > 1, False
+    """Draw the start and the goals that are on the map; returns what a legend says of them.
+
+    Args:
+        axes: where to draw, in metres of the map's frame.
+        world: the map.
+        start: of the route, in canonical metres.
+        motion: the state at the start behind the pose, speed first, in canonical metres.
+        stops: the goals, in canonical metres.
+        scale: metres of the map in a canonical metre.
+        longest: the longer side of what is shown.
+    """
+    several, discs, goals = len(stops) > 1, False, 0
     for number, stop in enumerate(stops, start=1):
         right, up = stop.place
         x, y, heading = world.pose(scale * right, scale * up, stop.arrival.heading or 0.0)
         goal = (x, y)
         if not axes.viewLim.contains(x, y):
             continue  # off the map: marks that are not clipped would shrink everything else
+        goals += 1
         if stop.is_pose:
             _draw_heading(axes, goal, heading, GREEN, longest)
         elif scale * stop.radius > _SEEN * longest:
@@ -89,10 +106,12 @@ def draw_ends(
     x, y, heading = world.pose(scale * start[0], scale * start[1], start[2])
     axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
     _draw_heading(axes, (x, y), heading, INK, longest)
+    speed = scale * motion[0] if motion else 0.0
+    moving = f", {'backwards ' if speed < 0.0 else ''}at {abs(speed):.3g} m/s" if speed else ""
     return [
-        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
-        Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
-               markersize=10, label="goals in order" if several else "goal"),
+        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label=f"start{moving}"),
+        *[Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
+                 markersize=10, label="goals in order" if several else "goal")] * (goals > 0),
         *[Patch(**_DISC, label="where it may stop")] * discs,
     ]  # fmt: skip
 

@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from dashboards.figures.manoeuvre_picture import BACKWARDS, draw_manoeuvre, manoeuvre_legend
+from dashboards.figures.map_picture import cells_legend
 from dashboards.figures.map_view import (
     CLOSE_UP_LENGTHS,
     OCCUPIED,
@@ -80,10 +81,10 @@ def route_picture(
         axes.plot(*placed(world, scale * path).T, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=3)
     shown, backs = _draw_legs(axes, world, driven, scale, vehicle, view.longest)
     handles = [
-        *draw_ends(axes, world, route.problem.start, stops, scale, view.longest),
+        *draw_ends(axes, world, route.problem.start, route.problem.start_motion, stops, scale, view.longest),
         *shown,
         Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
-        Patch(facecolor=OCCUPIED, label="occupied"),
+        *cells_legend(world, OCCUPIED),
     ]
     manoeuvres = manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals]) if arrivals else []
     if backs and "backwards" not in [entry.get_label() for entry in manoeuvres]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
-from dashboards.figures.map_picture import draw_map
+from dashboards.figures.map_picture import cells_legend, draw_map
 from dashboards.figures.map_view import (
     CLOSE_UP_LENGTHS,
     OCCUPIED,
@@ -46,6 +46,7 @@ def stuck_picture(
     stuck: Stuck,
     scale: float,
     vehicle: Vehicle = CAR,
+    motion: tuple[float, ...] = (),
 ) -> Figure:
     """A figure of a map in its own frame and where a route over it ends too early.
 
@@ -59,6 +60,7 @@ def stuck_picture(
         stuck: why there is no route, and where.
         scale: metres of the map in a canonical metre.
         vehicle: the vehicle that was to drive.
+        motion: the state at the start behind the pose, speed first, in canonical metres.
     """
     places = np.array([start[:2], stuck.place, *(stop.place for stop in stops)])
     view = view_around(world, [places], scale, vehicle)
@@ -71,7 +73,7 @@ def stuck_picture(
         f"No route over {world.name}",
         stuck.told(world, scale).replace("; ", ";\n"),
     )
-    handles = draw_ends(axes, world, start, stops, scale, view.longest)
+    handles = draw_ends(axes, world, start, motion, stops, scale, view.longest)
     for close_up in close_ups:
         axes.plot(x, y, **_CROSS, markersize=11, zorder=12)
         told = "no way out was found" if stuck.is_enclosed else "stuck here"
@@ -103,7 +105,7 @@ def stuck_picture(
             handles.append(
                 Patch(facecolor="none", edgecolor=VERMILLION, label="where the vehicle would stand")
             )
-    handles.append(Patch(facecolor=OCCUPIED, label="occupied"))
+    handles += cells_legend(world, OCCUPIED)
     legend_below(figure, handles, 4)
     return figure
 

@@ -24,6 +24,7 @@ class OccupancyMap:
     occupied: Cells  # [rows, columns]; row 0 is the lowest
     resolution: float  # metres a cell
     origin: Pose = (0.0, 0.0, 0.0)  # the lower left corner: x, y (m), turn (rad)
+    unknown: Cells | None = None  # [rows, columns] the occupied cells that nobody has seen; for pictures only
 
     @property
     def size(self) -> tuple[float, float]:

@@ -41,8 +41,10 @@ def read_grid(
         arrays = ", ".join(str(list(shape)) for _, shape in shapes[:5]) or "nothing"
         raise ValueError(f"holds {arrays}; expected one array [rows, columns]")
     check_size(*shapes[0][1])
-    cells = _occupied(_arrays(file)[0][1], unknown_is_occupied)
-    return OccupancyMap(name, cells[::-1], metres)
+    occupied, unknown = _judged(_arrays(file)[0][1])
+    if not unknown_is_occupied:
+        return OccupancyMap(name, occupied[::-1], metres)
+    return OccupancyMap(name, (occupied | unknown)[::-1], metres, unknown=unknown[::-1])
 
 
 def grid_worlds(
@@ -72,15 +74,17 @@ def grid_worlds(
         for index, cells in enumerate(array.reshape(-1, PIXELS, PIXELS)):
             where = f"{name}[{index}]"
             try:
-                occupied = _occupied(cells, unknown_is_occupied)
+                occupied, unknown = _judged(cells)
             except ValueError as error:
                 yield where, str(error)
             else:
-                yield where, problem_of_cells(occupied, f"{identity}-{number}", class_name)
+                blocked = occupied | unknown if unknown_is_occupied else occupied
+                yield where, problem_of_cells(blocked, f"{identity}-{number}", class_name)
             number += 1
 
 
-def _occupied(cells: Array, unknown_is_occupied: bool) -> Cells:
+def _judged(cells: Array) -> tuple[Cells, Cells]:
+    """Which cells are certainly occupied, and which are unknown."""
     unknown = np.isnan(cells) if cells.dtype.kind == "f" else np.zeros(cells.shape, bool)
     if cells.dtype.kind in "if":
         unknown = unknown | (cells == -1)
@@ -88,7 +92,7 @@ def _occupied(cells: Array, unknown_is_occupied: bool) -> Cells:
     other = ~(unknown | occupied | (cells == 0))
     if other.any():
         raise ValueError(f"holds {cells[other][0]}; expected 0 (free), 1 (occupied) and -1 or NaN (unknown)")
-    return occupied | unknown if unknown_is_occupied else occupied
+    return occupied, unknown
 
 
 def _shapes(file: Path) -> Iterator[tuple[str, tuple[int, ...]]]:

@@ -43,7 +43,9 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
     except ValueError as error:
         raise ValueError(f"names the image {image.name}, which {error}") from None
     occupied, free = _judged(picture, fields)
-    return OccupancyMap(name, (occupied if not unknown_is_occupied else ~free)[::-1], resolution, (x, y, yaw))
+    if not unknown_is_occupied:
+        return OccupancyMap(name, occupied[::-1], resolution, (x, y, yaw))
+    return OccupancyMap(name, ~free[::-1], resolution, (x, y, yaw), ~(occupied | free)[::-1])
 
 
 def picture_of(file: Path) -> Path:

@@ -117,7 +117,8 @@ def drive_route(
             from dashboards.figures.stuck_picture import stuck_picture  # late: few routes are drawn
             from dashboards.figures.style import save_picture
 
-            save_picture(stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle), drawing)
+            stuck = stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle, motion)
+            save_picture(stuck, drawing)
         failure = _refusal(route, source, world, scale, any(motion))
         return DrivenRoute(None, [], {"status": "stuck"} | route.fields(world, scale), failure)
     plan = route.plan(assistant.vehicle)

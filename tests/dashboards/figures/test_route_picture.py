@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.patches import Circle
 
 from dashboards.figures.route_picture import route_picture
 from dashboards.figures.stuck_picture import stuck_picture
+from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.route import Route
 from planners.routes.router import Router
 from planners.routes.stuck import Stuck
+from planners.world.vehicles.vehicle import CAR
 from tests.planners.maps.samples import town
 from tests.planners.routes.test_route import START, searched
 
@@ -73,3 +76,43 @@ def test_of_a_place_that_is_not_on_the_map_there_is_no_close_up() -> None:
     stuck = Router(world, searched).route(START, stops)
     assert isinstance(stuck, Stuck)
     assert len(stuck_picture(world, START, stops, stuck, 1.0).axes) == 1
+    assert not [label for label in _labels(world, stops, stuck) if "goal" in label]
+    on_it = [Stop((2000.0, 12.0)), Stop((50.0, 100.0))]
+    assert "goals in order" in _labels(world, on_it, stuck)
+
+
+def test_the_legend_says_how_fast_the_vehicle_is_at_the_start() -> None:
+    world, stops = town(), [Stop((2000.0, 12.0))]
+    stuck = Router(world, searched).route(START, stops)
+    assert isinstance(stuck, Stuck)
+    for motion, told in (
+        ((), "start"),
+        ((0.0, 0.1), "start"),
+        ((1.5,), "start, at 3 m/s"),
+        ((-0.5,), "start, backwards at 1 m/s"),
+    ):
+        assert told in _labels(world, stops, stuck, motion)
+
+
+def test_unknown_cells_are_drawn_apart_from_occupied_ones() -> None:
+    world, stops = town(), [Stop((2000.0, 12.0))]
+    stuck = Router(world, searched).route(START, stops)
+    assert isinstance(stuck, Stuck)
+    unknown = world.occupied & (np.indices(world.occupied.shape)[0] % 2 == 0)
+    of_both = replace(world, unknown=unknown)
+    (picture,) = stuck_picture(of_both, START, stops, stuck, 1.0).axes[0].images
+    colours = picture.to_rgba(picture.get_array(), alpha=None)
+    seen = {tuple(colour) for colour in colours[unknown].tolist()}
+    walls = {tuple(colour) for colour in colours[world.occupied & ~unknown].tolist()}
+    assert len(seen) == len(walls) == 1
+    assert seen != walls
+    assert (colours[~world.occupied][:, 3] == 0.0).all()  # free cells are not painted
+    for each, count in ((world, 0), (replace(world, unknown=np.zeros_like(unknown)), 0), (of_both, 1)):
+        assert sum("unknown" in label for label in _labels(each, stops, stuck)) == count
+
+
+def _labels(
+    world: OccupancyMap, stops: list[Stop], stuck: Stuck, motion: tuple[float, ...] = ()
+) -> list[str]:
+    (legend,) = stuck_picture(world, START, stops, stuck, 2.0, CAR, motion).legends
+    return [text.get_text() for text in legend.get_texts()]

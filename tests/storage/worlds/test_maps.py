@@ -122,6 +122,19 @@ def test_unknown_cells_of_a_grid_are_occupied_or_free_by_choice(tmp_path: Path) 
         assert loaded(tmp_path / "a.npy", unknown="free").occupied.tolist() == [[False, True, False]]
 
 
+def test_unknown_is_what_is_occupied_by_choice_alone(tmp_path: Path) -> None:
+    write_ros(tmp_path / "town.yaml", CELLS, "town.png")
+    levels = np.array([[0, 100, 204], [205, 206, 254]], np.uint8)
+    Image.fromarray(levels).save(tmp_path / "town.png")
+    np.save(tmp_path / "a.npy", np.array([[0, 1, -1], [-1, 1, 0]], np.int8))
+    for name in ("town.yaml", "a.npy"):
+        found, certain = loaded(tmp_path / name), loaded(tmp_path / name, unknown="free")
+        assert found.unknown is not None
+        assert found.unknown.any()
+        np.testing.assert_array_equal(found.unknown, found.occupied & ~certain.occupied)
+        assert certain.unknown is None
+
+
 def test_scenarios_lie_in_the_middles_of_cells_with_y_up(tmp_path: Path) -> None:
     world = OccupancyMap("m", np.zeros((150, 200), bool), 2.0)
     (tmp_path / "m.scen").write_text("version 1\n0\tmaps/m.map\t200\t150\t0\t0\t199\t149\t200.5\n")
