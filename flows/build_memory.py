@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from prefect.runtime import flow_run
+
 from tasks.fan_out.fan_out import run_stage
 from tasks.reports.report import log_retrieval, report_retrieval
 from tasks.session.stage_flow import stage_flow
@@ -18,4 +20,5 @@ def build_memory(settings: RunSettings, data: str) -> None:
     run_stage(MEASURE_RECALL, data, settings)
     retrieval = report_retrieval(data, settings)
     log_memories(data, settings, memories, retrieval)
-    log_retrieval(retrieval)
+    if flow_run.parent_flow_run_id is None:  # larger flows tell it in their reports, or only their verdicts
+        log_retrieval(retrieval)
