@@ -17,11 +17,11 @@ from planners.search.manoeuvres.forward_arrivals import arrive_forwards
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.variants import counting_time, slowed
 from planners.search.outcome import Outcome, Status
-from planners.search.query import POSE_EXPANSIONS, Query
+from planners.search.query import POSE_EXPANSIONS, Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
-from planners.world.problem import Plan, start_state
+from planners.world.problem import Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -38,12 +38,18 @@ BESIDE = 4000  # expansions of the first search beside a plan that is given wher
 SECOND = {"lattice": "follow"}  # who is asked as well where a planner finds nothing, or the way winds, ...
 TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing; ...
 LATE = 1.1  # ... and where a drive to a pose takes so many times as long as was expected
+FAR_M = 8.0  # a pose so far away may be driven to by way of its place ...
+PLACE_M = 4.0  # ... to within so many metres of it, ...
+BEFORE_PLACE = 12_000  # ... after so many expansions without a plan
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
+
+
+Answer = tuple[Outcome, Plan | None]  # of a search, its plan polished; and what that was before
 
 
 def search_and_polish(
     planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
-) -> tuple[Outcome, Plan | None]:
+) -> Answer:
     """Search for several plans, polish them and keep the one that costs least.
 
     Where a vehicle's drives cost more than their time, all of that is done twice: by what they cost, and as
@@ -54,10 +60,10 @@ def search_and_polish(
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
     first search took, the worse its plan mostly is, and the longer they may take. Where nothing is found, the
-    way winds, or a drive to a pose takes longer than expected, another planner is asked as well. If the
-    answer still takes much longer than the planner expected, it is improved for as long as that is worth. A
-    given plan may be of a worse kind than what the planner finds, so it searches as if there were none, but
-    at first not for long.
+    way winds, or a drive to a pose takes longer than expected, another planner is asked as well; or to a pose
+    that is far, for a drive to its place and on from there. If the answer still takes much longer than the
+    planner expected, it is improved for as long as that is worth. A given plan may be of a worse kind than
+    what the planner finds, so it searches as if there were none, but at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -78,7 +84,7 @@ def search_and_polish(
         return _searched_and_polished(planner, query, seed, given, below_s)
     rng = copy.deepcopy(query.rng)
 
-    def as_if(driver: Vehicle, given: Plan | None) -> tuple[Outcome, Plan | None]:
+    def as_if(driver: Vehicle, given: Plan | None) -> Answer:
         limits = replace(query.limits, seconds=max(until - working_clock(), 0.0))
         other = replace(query, vehicle=driver, rng=copy.deepcopy(rng), limits=limits, beside=None)
         return _searched_and_polished(planner, other, seed, given, below_s)
@@ -101,9 +107,7 @@ def search_and_polish(
     return _with_work([each for each, _ in answers], answer), rough
 
 
-def _cheapest(
-    answers: Sequence[tuple[Outcome, Plan | None]], vehicle: Vehicle
-) -> tuple[Outcome, Plan | None]:
+def _cheapest(answers: Sequence[Answer], vehicle: Vehicle) -> Answer:
     """The first answer with the plan that costs least, or without a plan if none has one."""
     return min(answers, key=lambda each: cost_of(each[0].plan, vehicle) if each[0].plan else math.inf)
 
@@ -122,16 +126,26 @@ def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
 
 def _searched_and_polished(
     planner: str, query: Query, seed: int, given: Plan | None, below_s: float
-) -> tuple[Outcome, Plan | None]:
+) -> Answer:
     """As ``search_and_polish``, once."""
     until = working_clock() + query.limits.seconds
     query, vehicle = asking_for_kinds(planner, query), query.vehicle
-    found, best = _first_answer(planner, query, seed, given, below_s, until)
+    asks_others = planner in SECOND and query.limits.second
+    goes_by_place = asks_others and math.isinf(below_s) and _is_far_pose(query.problem)
+    first = query
+    if goes_by_place and given is None and query.beside is None and query.endings is None:
+        most = min(BEFORE_PLACE, query.limits.expansions)
+        first = replace(query, rng=copy.deepcopy(query.rng), limits=replace(query.limits, expansions=most))
+    found, best = _first_answer(planner, first, seed, given, below_s, until)
     expected_s = math.inf if found.expected_s is None else found.expected_s
-    if planner in SECOND and query.limits.second and not query.others:
-        plan = best[0].plan
-        is_late = plan is not None and plan.duration_s > LATE * expected_s
-        is_doubtful = found.winds or (is_late and query.problem.asks_for_pose)
+    plan = best[0].plan
+    is_late = plan is not None and plan.duration_s > LATE * expected_s
+    is_doubtful = not query.others and (found.winds or (is_late and query.problem.asks_for_pose))
+    if goes_by_place and (is_doubtful or _is_open(best)):
+        best = _cheaper(best, _by_way_of_place(planner, query, seed, until), vehicle)
+    if _is_open(best) and first.limits.expansions < query.limits.expansions:
+        best = _cheaper(best, _first_answer(planner, query, seed, given, below_s, until)[1], vehicle)
+    if asks_others and not query.others and (best[0].plan is None or not goes_by_place):
         best = _with_second(SECOND[planner], query, seed, is_doubtful, best, below_s, until)
     answer, rough = best
     plan = answer.plan
@@ -148,9 +162,25 @@ def _searched_and_polished(
     return answer, anew or rough
 
 
+def _is_far_pose(problem: Problem) -> bool:
+    """Whether a pose is asked for whose place is some way off."""
+    return problem.asks_for_pose and math.dist(problem.start[:2], problem.goal) > FAR_M
+
+
+def _is_open(answer: Answer) -> bool:
+    """Whether there is no plan yet, and more work may find one."""
+    return answer[0].plan is None and answer[0].status is Status.BUDGET_SPENT
+
+
+def _cheaper(one: Answer, other: Answer, vehicle: Vehicle) -> Answer:
+    """The cheaper of two answers, with the work of both."""
+    cheapest, rough = _cheapest([one, other], vehicle)
+    return _with_work([one[0], other[0]], cheapest), rough
+
+
 def _first_answer(
     planner: str, query: Query, seed: int, given: Plan | None, below_s: float, until: float
-) -> tuple[Outcome, tuple[Outcome, Plan | None]]:
+) -> tuple[Outcome, Answer]:
     """Search for several plans with one planner, and polish them.
 
     Returns:
@@ -207,10 +237,10 @@ def _with_second(
     query: Query,
     seed: int,
     is_doubtful: bool,
-    best: tuple[Outcome, Plan | None],
+    best: Answer,
     below_s: float,
     until: float,
-) -> tuple[Outcome, Plan | None]:
+) -> Answer:
     """The cheaper of an answer and that of another planner, if it is doubtful or nothing was found."""
     for number, times in enumerate(TRIES):
         answer, expansions = best[0], times * query.limits.expansions
@@ -222,15 +252,49 @@ def _with_second(
         limits = replace(query.limits, expansions=expansions, seconds=max(until - working_clock(), 0.0))
         rng = generator(seed, "second", query.problem.id, planner, number)
         asked = replace(query, rng=rng, limits=limits, beside=None)
-        answers = [best, _first_answer(planner, asked, seed, None, below_s, until)[1]]
-        cheapest, rough = _cheapest(answers, query.vehicle)
-        best = _with_work([each for each, _ in answers], cheapest), rough
+        best = _cheaper(best, _first_answer(planner, asked, seed, None, below_s, until)[1], query.vehicle)
     return best
+
+
+def _by_way_of_place(planner: str, query: Query, seed: int, until: float) -> Answer:
+    """Search for a drive to the place of a pose, and from there on into the pose; the answer is polished.
+
+    Far from a pose a search for all of it at once has much to try that differs in the last metres alone.
+    """
+    problem, around = query.problem, (query.vehicle, query.scene, query.workspace)
+
+    def asked(of: str, problem: Problem, prefix: Plan | None) -> Query:
+        limits = replace(
+            query.limits, expansions=Limits.expansions, seconds=max(until - working_clock(), 0.0)
+        )
+        return replace(
+            query,
+            problem=problem,
+            prefix=prefix,
+            rng=generator(seed, of, problem.id, planner),
+            limits=limits,
+            knows_way=False,
+            is_tight=None,
+            beside=None,
+            others=False,
+        )
+
+    place = replace(problem, arrival=None, goal_radius=max(PLACE_M, problem.goal_radius))
+    there = asked("to place", place, None)
+    there_found, _ = _searched_and_polished(planner, replace(there, endings=None), seed, None, math.inf)
+    if there_found.plan is None:
+        return there_found, None
+    onward = PLANNERS[planner](asked("onward", problem, there_found.plan))
+    plan = onward.plan
+    if plan is not None:
+        polished = polish(problem, plan, *around, seconds=max(until - working_clock(), 0.0)).plan
+        onward = replace(onward, plan=polished or plan)
+    return _with_work([there_found, onward], onward), plan
 
 
 def _improved(
     planner: str, query: Query, seed: int, answer: Outcome, expansions: int, until: float
-) -> tuple[Outcome, Plan | None]:
+) -> Answer:
     """A polished answer after so many more expansions, and its plan if that was found anew."""
     more = improve(
         *(planner, query.problem, answer.plan),

@@ -116,6 +116,7 @@ def test_where_a_first_plan_was_hard_to_find_the_next_search_may_take_longer(
     assert question is not None
     problem, _ = to_canonical(question)
     monkeypatch.setattr(searching, "A_SECOND", 0)
+    monkeypatch.setattr(searching, "SECOND", {})
     answer = solve(problem, "lattice", seed=1)
     monkeypatch.setattr(searching, "AS_MANY", 0)
     hasty = solve(problem, "lattice", seed=1)
@@ -129,6 +130,7 @@ def test_poses_that_take_longer_than_expected_are_improved(monkeypatch: pytest.M
     """A car drove in a circle before a door, though drives of other kinds took seconds less."""
     source = problem_class("curves")
     asked = [question_in(source.draw(6, i), i, 6, pose=True) for i in (22, 23, 53)]
+    monkeypatch.setattr(searching, "SECOND", {})
     driven = []
     for times in (searching.TO_POSE, 0):
         monkeypatch.setattr(searching, "TO_POSE", times)
