@@ -15,18 +15,25 @@ from planners.world.vehicles.vehicle import Vehicle
 
 REACH: Final = 0.5  # of the vehicle's width: farther away it is another place
 RINGS: Final = 20
+FARTHER: Final = 0.5  # rings
 BEARINGS: Final = 16
 
 
 def free_nearby(state: Floats, vehicle: Vehicle, scene: Scene) -> Point | None:
     """Find the nearest of some places around a state ``[S]`` at which it would be free, turned as it is.
 
-    Returns its x and y (m); None if there is none within half the vehicle's width.
+    Returns x and y (m) a little beyond it, so that they may be rounded; None if there is no such place within
+    half the vehicle's width.
     """
-    for ring, bearing in itertools.product(range(1, RINGS + 1), range(BEARINGS)):
+
+    def moved(ring: float, bearing: int) -> Floats:
         metres, angle = REACH * vehicle.width * ring / RINGS, math.tau * bearing / BEARINGS
-        moved = state.copy()
-        moved[:2] += metres * math.cos(angle), metres * math.sin(angle)
-        if is_free_drive(moved[np.newaxis], vehicle, scene):
-            return float(moved[0]), float(moved[1])
+        there = state.copy()
+        there[:2] += metres * math.cos(angle), metres * math.sin(angle)
+        return there
+
+    for ring, bearing in itertools.product(range(1, RINGS + 1), range(BEARINGS)):
+        beyond = moved(ring + FARTHER, bearing)
+        if all(is_free_drive(each[np.newaxis], vehicle, scene) for each in (moved(ring, bearing), beyond)):
+            return float(beyond[0]), float(beyond[1])
     return None

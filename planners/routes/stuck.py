@@ -34,7 +34,10 @@ class Stuck(NamedTuple):
             line += f", turned by {turn:.2f} rad" if turn else ""
         if self.free is not None:
             away = scale * math.dist(self.place, self.free)
-            line += f"; {away:.2g} m away, at {_told_place(self.free, world, scale)}, it would be free"
+            digits = max(2, 2 - math.floor(math.log10(away)))  # rounding must not lead back
+            line += (
+                f"; {away:.2g} m away, at {_told_place(self.free, world, scale, digits)}, it would be free"
+            )
         if self.to_go is not None:
             line += f", {scale * self.to_go:.{0 if scale * self.to_go >= 10.0 else 1}f} m before it"
         if self.gap is not None:
@@ -67,10 +70,10 @@ class Stuck(NamedTuple):
         return self.gap is not None and self.gap.width < self.width
 
 
-def _told_place(point: Point, world: OccupancyMap, scale: float) -> str:
+def _told_place(point: Point, world: OccupancyMap, scale: float, digits: int = 2) -> str:
     """A place in metres of a map's own frame, of which ``scale`` are a canonical one."""
     x, y = _in_map(point, world, scale)
-    return f"({x:.2f}, {y:.2f})"
+    return f"({x:.{digits}f}, {y:.{digits}f})"
 
 
 def _in_map(point: Point, world: OccupancyMap, scale: float) -> Point:

@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.connection.words import MOST_WORDS, PARTS
 from planners.world.arrays import Floats
 from planners.world.goal import HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, X, Y
-from planners.world.jit import inlined
+from planners.world.jit import inlined, lean
 from planners.world.trigonometry import angle_to, sincos
 from planners.world.vehicles.dynamics import (
     State,
@@ -99,7 +99,7 @@ def radius_at(top: float, vehicle: Vehicle) -> float:
     return float(1.0 / curvature_of(tightest_bend(top, vehicle), vehicle))
 
 
-@inlined
+@lean
 def chooses_pace(vehicle: Vehicle) -> bool:
     """Whether arcs of words may be driven slowly: by who cannot reverse, and turns more sharply then."""
     fastest = turning_speed(vehicle)
@@ -110,7 +110,7 @@ def chooses_pace(vehicle: Vehicle) -> bool:
 def straight_speed(top: float, vehicle: Vehicle) -> float:
     """The largest speed (m/s) on the straight parts of a word whose arcs are driven with up to ``top``."""
     turning = turning_speed(vehicle)
-    if turning > top and chooses_pace(vehicle):
+    if vehicle.min_speed == 0.0 and turning > top and chooses_pace(vehicle):
         return vehicle.max_speed
     if turning == vehicle.max_speed:
         return top

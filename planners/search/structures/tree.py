@@ -190,12 +190,24 @@ def connect_to_goal(
 ) -> bool:
     """Drive from a vertex to the goal as if nothing were in the way, and add the drive if it is free.
 
-    ``top`` is the largest speed in m/s. Who cannot reverse may turn more slowly and sharply (``best_pace``).
+    ``top`` is the largest speed in m/s. Who cannot reverse tries to turn more slowly first, and sharply, if
+    that is quicker (``best_pace``).
     """
+    pace = top
+    if vehicle.min_speed == 0.0:
+        store(tree.connection.states, 0, load(tree.states, vertex, vehicle))
+        pace = best_pace(tree.connection, tree.gears[vertex], goal, top, vehicle)
+    if _connect_with(tree, vertex, goal, pace, vehicle, scene):
+        return True
+    return pace < top and _connect_with(tree, vertex, goal, top, vehicle, scene)
+
+
+@lean
+def _connect_with(tree: Tree, vertex: int, goal: Floats, top: float, vehicle: Vehicle, scene: Scene) -> bool:
+    """As ``connect_to_goal``, at one speed in arcs."""
     c = tree.connection
     state = load(tree.states, vertex, vehicle)
     store(c.states, 0, state)
-    top = best_pace(c, tree.gears[vertex], goal, top, vehicle)
     count = list_connections(c, tree.gears[vertex], goal, top, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
     radius = radius_at(top, vehicle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -190,7 +191,8 @@ def test_who_gets_into_doors_and_no_farther_soon_gives_up(monkeypatch: pytest.Mo
 
 def test_who_stands_a_little_in_a_wall_is_told_where_it_would_be_free() -> None:
     """And is refused there no more, as a start or as a goal."""
-    router, told = Router(walls([(40, 120)]), solves), 0
+    world = walls([(40, 120)])
+    router, told = Router(world, solves), 0
     for x, y, heading in np.random.default_rng(4).uniform((0.0, 0.0, -3.0), (20.0, 16.0, 3.0), (200, 3)):
         start = router.refusal((x, y, heading), [])
         if start is None:
@@ -199,8 +201,11 @@ def test_who_stands_a_little_in_a_wall_is_told_where_it_would_be_free() -> None:
         if start.free is None:
             continue
         told += 1
-        assert math.dist((x, y), start.free) <= 0.5 * CAR.width + 1e-9
+        assert math.dist((x, y), start.free) <= 0.52 * CAR.width
         assert router.refusal((*start.free, heading), []) is None
+        line = start.told(world, 1.0)
+        told_x, told_y = (float(each) for each in re.findall(r"away, at \((\S+), (\S+)\)", line)[0])
+        assert router.refusal((told_x, told_y, heading), []) is None
         free_pose = Stop(start.free, 1e-3, Arrival(heading, 1e-3, 0.0, 0.0))
         assert router.refusal((*START, 0.0), [free_pose]) is None
         goal = router.refusal((*START, 0.0), [Stop((x, y), 1e-3, Arrival(heading, 1e-3, 0.0, 0.0))])
