@@ -168,11 +168,15 @@ class DataReader:
         """The data folder's libraries by the names of their folders, and why others cannot be read."""
         facts, faults = {}, []
         for folder in folders_in(self.folder.libraries):
+            if not holds_plans(folder):
+                continue
+            if not NAME.fullmatch(folder.name):
+                faults.append(f"{folder} has a name that no address can hold; give it another one.")
+                continue
             try:
-                if NAME.fullmatch(folder.name):
-                    facts[folder.name] = library_facts(folder)
+                facts[folder.name] = library_facts(folder)
             except StorageError as error:
-                faults += [str(error)] if holds_plans(folder) else []
+                faults.append(str(error))
         return facts, faults
 
     def libraries_for(self, vehicle: Vehicle) -> list[str]:

@@ -87,14 +87,8 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
             f"{folder} was made for grids of {header.get('grid')!r} cells a side, expected {GRID}; "
             "build it again."
         )
+    check_sizes(folder, kind, header)
     listed: dict[str, Any] = header["files"]
-    for name, wanted in listed.items():
-        size = _size_of_plain_file(folder / name)
-        if size != wanted["bytes"]:
-            raise StorageError(
-                f"{folder / name} is damaged: it has {size} bytes, {wanted['bytes']} were written; "
-                f"copy or build the {kind} again."
-            )
     extra = sorted({file.name for file in folder.iterdir()} - {f"{kind}.json", *listed})
     if extra:
         raise StorageError(
@@ -106,6 +100,17 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
         if digest != listed[name]["sha256"]:
             raise _damaged(folder / name, kind)
     return header, {name: contents for name, (contents, _) in files.items()}
+
+
+def check_sizes(folder: Path, kind: str, header: dict[str, Any]) -> None:
+    """Raise StorageError if a file of an archive is missing, or not as long as its ``header`` says."""
+    for name, wanted in header["files"].items():
+        size = _size_of_plain_file(folder / name)
+        if size != wanted["bytes"]:
+            raise StorageError(
+                f"{folder / name} is damaged: it has {size} bytes, {wanted['bytes']} were written; "
+                f"copy or build the {kind} again."
+            )
 
 
 def archived_vehicle(folder: Path, kind: str) -> Vehicle:

@@ -12,7 +12,14 @@ from planners.memory.memory import Memory
 from planners.memory.plans.plan_arrays import StoredPlans
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
-from storage.archives.archive import archived_vehicle, kind_of, read_archive, read_header, write_archive
+from storage.archives.archive import (
+    archived_vehicle,
+    check_sizes,
+    kind_of,
+    read_archive,
+    read_header,
+    write_archive,
+)
 from storage.archives.memories import load_memory
 from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
 from storage.errors import StorageError
@@ -87,13 +94,14 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
 
 
 def library_facts(folder: Path) -> LibraryFacts:
-    """What the library in a ``folder`` says of itself; its plans are not looked at.
+    """What the library in a ``folder`` says of itself; of its plans only the lengths of their files count.
 
-    Raises StorageError if its header is missing or damaged or has another version.
+    Raises StorageError if its header or a file is missing or damaged, or it has another version.
     """
-    vehicle = archived_vehicle(folder, _KIND)
+    vehicle, header = archived_vehicle(folder, _KIND), read_header(folder, _KIND)
+    check_sizes(folder, _KIND, header)
     try:
-        return _facts(read_header(folder, _KIND), vehicle)
+        return _facts(header, vehicle)
     except (KeyError, TypeError, ValueError) as error:
         raise _incomplete(folder, error) from None
 

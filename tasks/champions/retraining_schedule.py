@@ -186,7 +186,9 @@ def _end_killed(name: str, data: str) -> None:
     with get_client(sync_client=True) as client:
         for each in client.read_flow_runs(flow_run_filter=at_work, deployment_filter=of_name):
             if each.parameters.get("data") == data:
-                client.set_flow_run_state(each.id, Crashed(message="It was killed."))
+                client.set_flow_run_state(
+                    each.id, Crashed(message="It was killed with its serve; the next one goes on.")
+                )
 
 
 def _run(deployment: RunnerDeployment) -> None:

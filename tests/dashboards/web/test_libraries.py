@@ -28,12 +28,15 @@ def _save(folder: Path, vehicle: Vehicle, *questions: str) -> None:
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
-    """A dashboard over a folder with three libraries, one of them damaged, and no run."""
+    """A dashboard over a folder with libraries, some of which cannot be used, and no run."""
     data = open_data_folder(tmp_path_factory.mktemp("libraries"))
     _save(data.libraries / "mine", CAR, "room-1", "room-1", "room-2")
     _save(data.libraries / "docks", CAR_1_TRAILER, "dock-standard-1-0")
     _save(data.libraries / "broken", CAR, "room-1")
     (data.libraries / "broken" / "library.json").write_text("{}", "utf-8")
+    _save(data.libraries / "cut", CAR, "room-1")
+    (data.libraries / "cut" / "states.npy").write_bytes(b"")
+    _save(data.libraries / "of <mine>", CAR, "room-1")
     (data.libraries / "notes").mkdir()
     with served(data, tuple) as address, httpx.Client(base_url=address, timeout=60.0) as client:
         yield client
@@ -47,7 +50,7 @@ def test_without_a_run_the_first_page_shows_the_libraries_and_leads_to_them(clie
     }
     (row,) = re.findall("<tr><td[^>]*>mine<.*?</tr>", text)
     assert re.sub("<[^>]*>", " ", row).split()[:4] == ["mine", "car", "3", "2"]  # plans, questions
-    assert "broken" in text  # is named
+    assert all(each in text for each in ("broken", "cut", "of &lt;mine&gt;"))  # are named
     assert "notes" not in text
 
 
