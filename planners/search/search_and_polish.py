@@ -264,15 +264,13 @@ def _by_way_of_place(planner: str, query: Query, seed: int, until: float) -> Ans
     problem, around = query.problem, (query.vehicle, query.scene, query.workspace)
 
     def asked(of: str, problem: Problem, prefix: Plan | None) -> Query:
-        limits = replace(
-            query.limits, expansions=Limits.expansions, seconds=max(until - working_clock(), 0.0)
-        )
+        most, left = min(Limits.expansions, query.limits.expansions), max(until - working_clock(), 0.0)
         return replace(
             query,
             problem=problem,
             prefix=prefix,
             rng=generator(seed, of, problem.id, planner),
-            limits=limits,
+            limits=replace(query.limits, expansions=most, seconds=left),
             knows_way=False,
             is_tight=None,
             beside=None,
