@@ -193,8 +193,9 @@ class DataReader:
 
     def memory_or_library(self, run: RunFolder, name: str) -> Memory | PlanLibrary:
         """The memory of that ``name`` of a ``run``, or the library. Raises MissingError if there is none."""
-        vehicle = self.vehicle(run)
-        return self.library(vehicle, name) if name in self.libraries_for(vehicle) else self.memory(run, name)
+        if name.startswith(f"{self.folder.libraries.name}/"):
+            return self.library(self.vehicle(run), name)
+        return self.memory(run, name)
 
     def problem(self, run: RunFolder, class_name: str, identity: str) -> Problem:
         """The problem with the id ``identity``: drawn again, or looked up among the worlds of a ``run``."""

@@ -40,7 +40,7 @@ class Doors:
         """
         self._world, self._paths, self._scene = world, paths, scene
         self._search, self._vehicle = search, vehicle
-        self._widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
+        self.widest: Final = max(body.width for body in (vehicle, *trailers_of(vehicle)))  # metres
         self._poses_left = 0
 
     def legs_through(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck | None:
@@ -60,7 +60,7 @@ class Doors:
 
     def at_a_gap(self, stuck: Stuck, start: Point, goal: Point) -> Stuck:
         """Say of a search that is stuck where the widest way ahead is narrow, if it is."""
-        return stuck._replace(gap=self._narrow_gap(start, goal), width=self._widest)
+        return stuck._replace(gap=self._narrow_gap(start, goal), width=self.widest)
 
     def _through_next(
         self, ahead: PathAhead, state: Floats, place: Point, passed: tuple[Point, ...]
@@ -103,4 +103,4 @@ class Doors:
 
     def _narrow_gap(self, start: Point, goal: Point) -> Gap | None:
         """Where the widest way is narrowest, if the vehicle hardly fits through there."""
-        return narrowest_gap(self._world, start, goal, NARROW * self._widest)
+        return narrowest_gap(self._world, start, goal, NARROW * self.widest)

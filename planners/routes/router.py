@@ -76,13 +76,13 @@ class Router:
         )
         self._scene = scene_of(self._whole)
         bodies = vehicle, *trailers_of(vehicle)
-        widest = max(body.width for body in bodies)
         fits = max(_disc_inside(body) for body in bodies)
         self._paths = passable(world, fits - 2.0 * tolerance_m, CELL_M)
-        self._wider = [cache(partial(passable, world, more * widest, CELL_M)) for more in WIDER]
-        self._wider.append(cache(self._roomy_paths))
         self._search = LegSearch(self._surroundings, self._scene, solve, vehicle, world.name)
         self._doors = Doors(world, self._paths, self._scene, self._search, vehicle)
+        widest = self._doors.widest
+        self._wider = [cache(partial(passable, world, more * widest, CELL_M)) for more in WIDER]
+        self._wider.append(cache(self._roomy_paths))
 
     def route(
         self,

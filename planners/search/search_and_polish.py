@@ -91,7 +91,7 @@ def search_and_polish(
 
     by_time = counting_time(vehicle)
     answers = [_searched_and_polished(planner, query, seed, given, below_s), as_if(by_time, given)]
-    best = _cheapest(answers, vehicle)[0].plan
+    best = _best_of(answers, vehicle)[0].plan
     slow = slowed(vehicle, float(start_state(query.problem, vehicle)[3]))
     least = min(vehicle.costs.forwards, vehicle.costs.backwards)
     is_dear = best is not None and cost_of(best, vehicle) - least * best.duration_s > DEAR
@@ -103,13 +103,13 @@ def search_and_polish(
             _, quicker = polish_quickest(query.problem, [answer.plan], *around, seconds=left)
             answer = replace(answer, plan=quicker.plan or answer.plan)
         answers.append((answer, rough))
-    answer, rough = _cheapest(answers, vehicle)
-    return _with_work([each for each, _ in answers], answer), rough
+    return _best_of(answers, vehicle)
 
 
-def _cheapest(answers: Sequence[Answer], vehicle: Vehicle) -> Answer:
-    """The first answer with the plan that costs least, or without a plan if none has one."""
-    return min(answers, key=lambda each: cost_of(each[0].plan, vehicle) if each[0].plan else math.inf)
+def _best_of(answers: Sequence[Answer], vehicle: Vehicle) -> Answer:
+    """The first answer with the plan that costs least, or without one if none has any; the work is of all."""
+    best, rough = min(answers, key=lambda each: cost_of(each[0].plan, vehicle) if each[0].plan else math.inf)
+    return _with_work([each for each, _ in answers], best), rough
 
 
 def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
@@ -142,9 +142,9 @@ def _searched_and_polished(
     is_late = plan is not None and plan.duration_s > LATE * expected_s
     is_doubtful = not query.others and (found.winds or (is_late and query.problem.asks_for_pose))
     if goes_by_place and (is_doubtful or _is_open(best)):
-        best = _cheaper(best, _by_way_of_place(planner, query, seed, until), vehicle)
+        best = _best_of([best, _by_way_of_place(planner, query, seed, until)], vehicle)
     if _is_open(best) and first.limits.expansions < query.limits.expansions:
-        best = _cheaper(best, _first_answer(planner, query, seed, given, below_s, until)[1], vehicle)
+        best = _best_of([best, _first_answer(planner, query, seed, given, below_s, until)[1]], vehicle)
     if asks_others and not query.others and (best[0].plan is None or not goes_by_place):
         best = _with_second(SECOND[planner], query, seed, is_doubtful, best, below_s, until)
     answer, rough = best
@@ -170,12 +170,6 @@ def _is_far_pose(problem: Problem) -> bool:
 def _is_open(answer: Answer) -> bool:
     """Whether there is no plan yet, and more work may find one."""
     return answer[0].plan is None and answer[0].status is Status.BUDGET_SPENT
-
-
-def _cheaper(one: Answer, other: Answer, vehicle: Vehicle) -> Answer:
-    """The cheaper of two answers, with the work of both."""
-    cheapest, rough = _cheapest([one, other], vehicle)
-    return _with_work([one[0], other[0]], cheapest), rough
 
 
 def _first_answer(
@@ -252,7 +246,8 @@ def _with_second(
         limits = replace(query.limits, expansions=expansions, seconds=max(until - working_clock(), 0.0))
         rng = generator(seed, "second", query.problem.id, planner, number)
         asked = replace(query, rng=rng, limits=limits, beside=None)
-        best = _cheaper(best, _first_answer(planner, asked, seed, None, below_s, until)[1], query.vehicle)
+        answers = [best, _first_answer(planner, asked, seed, None, below_s, until)[1]]
+        best = _best_of(answers, query.vehicle)
     return best
 
 

@@ -113,9 +113,9 @@ def check_sizes(folder: Path, kind: str, header: dict[str, Any]) -> None:
             )
 
 
-def archived_vehicle(folder: Path, kind: str) -> Vehicle:
-    """The vehicle that an archive is made for; raises StorageError as ``read_archive`` does."""
-    vehicle = vehicle_recorded(read_header(folder, kind).get("vehicle"))
+def archived_vehicle(folder: Path, header: dict[str, Any]) -> Vehicle:
+    """The vehicle that an archive with a ``header`` is made for; raises StorageError if it is not known."""
+    vehicle = vehicle_recorded(header.get("vehicle"))
     if vehicle is None:
         raise StorageError(
             f"{folder} was made for a vehicle that this program does not know; build it again."

@@ -98,7 +98,8 @@ def library_facts(folder: Path) -> LibraryFacts:
 
     Raises StorageError if its header or a file is missing or damaged, or it has another version.
     """
-    vehicle, header = archived_vehicle(folder, _KIND), read_header(folder, _KIND)
+    header = read_header(folder, _KIND)
+    vehicle = archived_vehicle(folder, header)
     check_sizes(folder, _KIND, header)
     try:
         return _facts(header, vehicle)
@@ -108,7 +109,7 @@ def library_facts(folder: Path) -> LibraryFacts:
 
 def vehicle_of(folder: Path) -> Vehicle:
     """The vehicle for which the memory or the library in a ``folder`` was made. Raises as loading does."""
-    return archived_vehicle(folder, kind_of(folder, *_KINDS))
+    return archived_vehicle(folder, read_header(folder, kind_of(folder, *_KINDS)))
 
 
 def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:
