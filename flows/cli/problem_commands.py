@@ -55,6 +55,7 @@ def plan(
     assist: AssistName | None = None,
     time_limit: float | None = None,
     improve_seconds: float = 0.0,
+    current: Path | None = None,
     explain: Annotated[bool, Parameter(negative=())] = False,
     out: Path | None = None,
     picture: Path | None = None,
@@ -72,6 +73,8 @@ def plan(
         time_limit: Seconds of planning, after which the best plan so far is the answer. What that is depends
             on the machine; a car in the open needs 0.01.
         improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
+        current: The plan that the robot drives now, .json. What is left of it from the problem's start is the
+            answer unless another plan is quicker.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
@@ -85,7 +88,7 @@ def plan(
 
     assistant = Assistant(options.settings(assist, improve_seconds, problem, time_limit=time_limit))
     attempt, found, answer, failure, written, learned = plan_one(
-        assistant, problem, out, picture, explain, learn, pick
+        assistant, problem, out, picture, explain, learn, pick, current
     )
     write_for_people(options.vehicle_line(assistant.settings, problem))
     lines = []

@@ -32,7 +32,7 @@ class PlanRecord:
 
     problem_id: str
     status: str
-    source: str | None  # recalled, repaired, searched or optimised
+    source: str | None  # recalled, repaired, searched, kept or optimised
     planner: str
     assist: str
     planning_seconds: float

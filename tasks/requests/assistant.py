@@ -16,7 +16,7 @@ from planners.optimisation.polish import most_iterations
 from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.query import Limits, usual_limits
 from planners.solve import improved, solve
-from planners.world.alignment import from_canonical, mirrored, to_canonical
+from planners.world.alignment import from_canonical, in_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
@@ -148,8 +148,12 @@ class Assistant:
         assist: str | None = None,
         seed: int | None = None,
         limits: Limits | None = None,
+        current: Plan | None = None,
     ) -> Attempt:
-        """Attempt a canonical problem, with other settings if given; the plan is not checked."""
+        """Attempt a canonical problem, with other settings if given; the plan is not checked.
+
+        ``current``: the plan that is being driven, in the canonical frame; None: the robot drives none.
+        """
         assist = assist or self.settings.assist
         return solve(
             canonical,
@@ -163,20 +167,28 @@ class Assistant:
             strategy=self.settings.recall,
             workspace=self._workspace,
             polished=self.settings.polished,
+            current=current,
         )
 
-    def improved_attempt(self, canonical: Problem, assist: str | None = None) -> Attempt:
+    def improved_attempt(
+        self, canonical: Problem, assist: str | None = None, current: Plan | None = None
+    ) -> Attempt:
         """Like ``attempt``, and improve its plan for as long as the settings say."""
-        attempt = self.attempt(canonical, assist)
+        attempt = self.attempt(canonical, assist, current=current)
         seconds = self.settings.improve_seconds
         if seconds > 0.0:
             attempt = improved(attempt, canonical, seconds, self.vehicle, self._workspace)
         return attempt
 
-    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
-        """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
+    def __call__(self, problem: Problem, current: Plan | None = None) -> tuple[Attempt, Plan | None]:
+        """Solve a problem; return the checked attempt and its plan in the frame of the problem.
+
+        ``current``: the plan that is being driven, in the frame and lengths of the problem; None: none is.
+        """
         canonical, alignment = to_canonical(problem)
-        attempt = check_attempt(canonical, self.improved_attempt(canonical), set(), self.vehicle)
+        driven = current and in_canonical(current, alignment)
+        attempt = self.improved_attempt(canonical, current=driven)
+        attempt = check_attempt(canonical, attempt, set(), self.vehicle)
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
 
     def recalled(self, problem: Problem, attempt: Attempt) -> list[Plan]:

@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Final
 
 from dashboards.cells import NOTHING, Cell, CellTable
-from planners.attempt import Attempt
+from planners.attempt import KEPT, Attempt
 from planners.drive_answers import DriveAnswer
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
@@ -22,6 +22,10 @@ USES: Final = {
     "repaired": "repaired",
     "guide": "guided the search",
     "": "",
+}
+BETTER: Final = {  # what the answer is instead of what the memory has, by its source
+    KEPT: "what is left of the current plan costs no more",
+    "searched": "the search found a quicker drive",
 }
 HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
 FIELDS: Final = (
@@ -80,8 +84,8 @@ def _recall_line(
     plans = f"{len(memory.plans):,} plans of {memory.class_name}"
     of_them = f"of {plans}"
     if drive is not None and drive.plan is not None:
-        if attempt.source == "searched":
-            more = f"takes {drive.plan.duration_s:.1f} s; the search found a quicker drive"
+        if attempt.source in BETTER:
+            more = f"takes {drive.plan.duration_s:.1f} s; {BETTER[attempt.source]}"
         else:
             more = "is the answer; the search found no quicker one" if drive.is_long else "is the answer"
         return f"recall   plan {drive.number} {of_them}, moved to this start and goal and polished, {more}"
@@ -89,9 +93,9 @@ def _recall_line(
         told = f"no plan {of_them} seemed likely to fit" if parts is None else _told_of(parts, attempt, plans)
         return f"recall   {told}"
     free = sum(recollection.is_free for recollection, _ in recalled)
-    quicker = ", but the search found a quicker one" if free and attempt.source == "searched" else ""
+    better = f", but {BETTER[attempt.source]}" if free and attempt.source in BETTER else ""
     return (
-        f"recall   {attempt.recall}, {len(recalled)} {of_them}, {free or 'none'} of them free{quicker}; "
+        f"recall   {attempt.recall}, {len(recalled)} {of_them}, {free or 'none'} of them free{better}; "
         "rank by the encoder, cells and states in collision:"
     )
 
@@ -106,8 +110,9 @@ def _told_of(parts: SubPlanAnswer, attempt: Attempt, plans: str) -> str:
     if parts.plan is None:
         more = "" if attempt.solved else "; the search found no way either"
         return f"no parts of {plans}, alone or one after another, lead to the goal without a collision{more}"
-    if parts.recalled:
-        found = f"lead to the goal in {parts.plan.duration_s:.1f} s; the search found a quicker drive"
+    if parts.recalled or attempt.source == KEPT:
+        better = BETTER[attempt.source or ""]
+        found = f"lead to the goal in {parts.plan.duration_s:.1f} s; {better}"
     else:
         found = (
             "make up less than half of the way to the goal that was found with them: it counts as searched"

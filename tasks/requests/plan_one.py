@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 from planners.attempt import TIMED_PARTS, Attempt
 from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
-from planners.world.alignment import from_canonical, to_canonical
+from planners.world.alignment import from_canonical, in_canonical, to_canonical
 from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import Vehicle
+from storage.exchange.plans import read_plan
 from storage.exchange.problems import read_problem
 from storage.places.data_folder import open_data_folder
 from tasks.attempts.timing import no_garbage_collection
@@ -25,6 +27,7 @@ from tasks.requests.plan_answers import (
 )
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_plan_outputs
+from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import UNASSISTED
 
 
@@ -47,6 +50,7 @@ def plan_one(
     explained: bool = False,
     learn: Path | None = None,
     pick: str | None = None,
+    current: Path | None = None,
 ) -> PlannedOne:
     """Plan for one problem of a file.
 
@@ -58,22 +62,28 @@ def plan_one(
         explained: whether to log and draw the recalled plans, where they collide and how they were used.
         learn: the data folder to which the problem and its plan are added as an experience, or None.
         pick: the id or the number of the problem; None takes the only one.
+        current: the file of the plan that the robot drives now, in the frame of the problem; None: it drives
+            none.
 
     Returns:
         the result; finding no plan is a result too.
 
     Raises:
-        UsageError: the name of an output has a wrong ending, or an output would be written over an input.
-        StorageError: the problem is malformed, the file has no such problem, or ``learn`` is no data folder.
+        UsageError: the name of an output has a wrong ending, an output would be written over an input,
+            or ``current`` holds no plan, or one of another scale.
+        StorageError: the problem or the plan of ``current`` is malformed or for another vehicle, the file has
+            no such problem, or ``learn`` is no data folder.
     """
-    check_plan_outputs([file, *assistant.files], out, drawing)
+    read = [file, *assistant.files, *([] if current is None else [current])]
+    check_plan_outputs(read, out, drawing)
     problem = read_problem(file, assistant.vehicle, pick)
+    current_plan = None if current is None else _current_plan(current, problem, assistant.vehicle)
     if learn is not None:
         open_data_folder(learn)
     with no_garbage_collection():
         assistant.warm_up(problem)
         with told_meanwhile("planning"):
-            attempt, plan = assistant(problem)
+            attempt, plan = assistant(problem, current_plan)
     record = assistant.record(problem, attempt, plan)
     written = write_answer_file(out, record)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
@@ -97,7 +107,7 @@ def plan_one(
         )
         save_picture(figure, drawing)
     if explained:
-        _explain(assistant, problem, attempt, recalled, drive)
+        _explain(assistant, problem, current_plan, attempt, recalled, drive)
     failure = None
     if plan is None:
         why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
@@ -105,9 +115,21 @@ def plan_one(
     return PlannedOne(attempt, plan, answer, failure, written, learned)
 
 
+def _current_plan(file: Path, problem: Problem, vehicle: Vehicle) -> Plan:
+    """The plan in a file, in the frame and lengths of a problem. Errors are those of ``plan_one``."""
+    record = read_plan(file, vehicle)
+    plan = record.plan_in_frame_of(problem)
+    if plan is None:
+        raise UsageError(f"{file} holds no plan that a robot could drive: its status is {record.status!r}.")
+    if record.scale != problem.scale:
+        raise UsageError(f"{file} has the scale {record.scale:g}, the problem {problem.scale:g}.")
+    return plan
+
+
 def _explain(
     assistant: Assistant,
     problem: Problem,
+    current_plan: Plan | None,
     attempt: Attempt,
     recalled: Sequence[Plan],
     drive: MovedDrive | None,
@@ -115,7 +137,7 @@ def _explain(
     # late: tables cost a tenth of a second
     from tasks.requests.explain import log_explanation, log_without_memory
 
-    canonical, _ = to_canonical(problem)
+    canonical, alignment = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
     ranked = memory if isinstance(memory, Memory) and recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
@@ -124,4 +146,6 @@ def _explain(
     log_explanation(attempt, memory, listed, problem, parts, drive and drive.answer)
     if memory is not None:
         with no_garbage_collection():
-            log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))
+            current = current_plan and in_canonical(current_plan, alignment)
+            alone = assistant.improved_attempt(canonical, UNASSISTED.name, current)
+            log_without_memory(attempt, alone)

@@ -115,6 +115,52 @@ def test_the_problem_that_is_picked_is_the_one_that_is_answered(
     assert told["answer"]["problem_id"] == problem(1).id
 
 
+@pytest.mark.parametrize("east", [0.0, 5_000.0])
+def test_who_drives_a_plan_is_given_what_is_left_of_it_unless_another_is_quicker(
+    east: float, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = json.loads((place / "one.json").read_text())
+    for name in ("start", "goal"):
+        asked[name][0] += east
+    asked["bounds"] = [low + (0.0 if axis % 2 else east) for axis, low in enumerate(asked["bounds"])]
+    asked["obstacles"] = [[[x + east, y] for x, y in polygon] for polygon in asked["obstacles"]]
+    (place / "asked.json").write_text(json.dumps(asked))
+    first = _told("plan asked.json --out driven.json", place, monkeypatch, capsys)["answer"]
+    driven = json.loads((place / "driven.json").read_text())
+    x, y, heading, speed, steering = driven["states"][20]
+    moved = asked | {"start": [x, y, heading], "start_speed": speed, "start_steering": steering}
+    (place / "moved.json").write_text(json.dumps(moved))
+    again = _told("plan moved.json --current driven.json", place, monkeypatch, capsys)["answer"]
+    assert again["duration_s"] <= first["duration_s"] - 20 * first["dt"] + 1e-9
+    worse = "plan moved.json --planner gust --unpolished"  # which finds nothing as quick
+    assert _told(f"{worse} --current driven.json", place, monkeypatch, capsys)["answer"]["source"] == "kept"
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "why"),
+    [
+        ({"status": "exhausted", "states": [], "controls": []}, 2, "holds no plan"),
+        ({"scale": 2.0}, 2, "scale"),
+        ({"dt": 0.2}, 1, "dt"),
+    ],
+)
+def test_a_current_plan_that_cannot_be_driven_on_is_refused(
+    changes: dict[str, Any],
+    code: int,
+    why: str,
+    place: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _told("plan one.json --out driven.json", place, monkeypatch, capsys)
+    driven = json.loads((place / "driven.json").read_text())
+    (place / "other.json").write_text(json.dumps(driven | changes))
+    told = _told("plan one.json --current other.json", place, monkeypatch, capsys, code)
+    assert why in told["error"]
+    told = _told("plan one.json --current driven.json --out driven.json", place, monkeypatch, capsys, 2)
+    assert "driven.json" in told["error"]
+
+
 def test_the_parts_of_a_plan_are_numbers_and_its_states_are_there_once(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

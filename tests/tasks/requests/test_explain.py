@@ -97,6 +97,21 @@ def test_the_command_tells_and_draws_it(
     assert "no memory" in capsys.readouterr().out
 
 
+def test_it_says_that_what_is_left_of_the_current_plan_is_the_answer(
+    memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_memory(tmp_path / "memory", memory)
+    write_problems(tmp_path / "open.json", [problem_of([], "open")])
+    asked = ["plan", str(tmp_path / "open.json"), "--memory", str(tmp_path / "memory"), "--explain"]
+    assert call([*asked, "--planner", "lattice", "--out", str(tmp_path / "driven.json")]) == 0
+    capsys.readouterr()
+    current = ["--current", str(tmp_path / "driven.json")]
+    assert call([*asked, "--planner", "gust", "--unpolished", *current]) == 0
+    told = capsys.readouterr().out
+    assert "5 of them free, but what is left of the current plan costs no more;" in told
+    assert "kept, " in told
+
+
 def test_places_of_collisions_are_told_in_the_metres_of_a_problem_far_from_the_origin(
     memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
