@@ -101,16 +101,15 @@ def test_what_cannot_be_served_is_one_line(
         assert said.count("\n") == 1
 
 
-def test_a_port_that_is_taken_is_one_line(memory: Path) -> None:
+def test_a_port_that_is_taken_is_one_line(memory: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        command = [sys.executable, "-m", "flows.cli.main", "serve-memory", str(memory), "--port", port]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
-    assert done.returncode == 1
-    assert f"Port {port} on 127.0.0.1 cannot be used" in done.stderr
-    assert done.stderr.count("\n") == 1
+        assert call(["serve-memory", str(memory), "--port", port]) == 1
+    said = capsys.readouterr().err
+    assert f"Port {port} on 127.0.0.1 cannot be used" in said
+    assert said.count("\n") == 1
 
 
 @pytest.mark.slow
