@@ -36,7 +36,7 @@ class Attempt:
     scene_seconds: float  # making the obstacles ready for collision checks
     check_seconds: float
     guide_seconds: float  # finding a path over the grid and making the guide
-    repair_seconds: float  # repairing a recalled plan, successfully or not
+    repair_seconds: float  # fitting a plan that is at hand, recalled or current, to the problem, or trying to
     roadmap_seconds: float
     search_seconds: float
     hit: bool | None  # whether recalled plans answer it as they are, without any search; None: no memory

@@ -113,6 +113,7 @@ def solve(
             polished=polished,
             until=until,
         )
+    hit = None if memory is None else found.source == "recalled"
     if current is not None:
         rest = rest_of(current, problem, vehicle, view.scene, view.workspace, until)
         if rest is not None and (
@@ -139,7 +140,7 @@ def solve(
         source=None if plan is None else answer.source,
         planning_seconds=planning_seconds,
         **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in TIMED_PARTS},
-        hit=None if memory is None else found.source == "recalled",
+        hit=hit,
         helped=answer.helped,
         recalled=found.recalled,
         collision_checks=int(answer.work[0]),
@@ -241,7 +242,7 @@ def _searched(
     view.seconds["search"] -= searched.roadmap_seconds
     if helper is not None:
         work += helper.cost()
-        view.seconds["repair"] = helper.repair_seconds
+        view.seconds["repair"] = view.seconds.get("repair", 0.0) + helper.repair_seconds
         view.seconds["search"] -= helper.repair_seconds
     plan, helped = searched.plan, helper is not None and helper.has_begun
     if rough is not None and rough is found.plan:

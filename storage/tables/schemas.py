@@ -144,7 +144,7 @@ ATTEMPTS: Final = _schema(
         ("host", pa.string()),
         ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
         ("guide_seconds", pa.float64()),  # finding a way over the grid, or along a recalled plan
-        ("repair_seconds", pa.float64()),  # repairing a recalled plan, successful or not
+        ("repair_seconds", pa.float64()),  # fitting a plan that is at hand to the problem, or trying to
         ("verified", pa.bool_()),  # what the authority said of the plan; null if there is none
         ("vehicle", pa.string()),  # its name
         ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory

@@ -1,4 +1,5 @@
 import functools
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -111,6 +112,16 @@ def test_a_free_plan_that_is_no_detour_is_the_answer():
     quick = polish.polish(problem, found, CAR, scene_of(problem), Workspace()).plan
     again = first(problem, "lattice", "closed", 5, memory_of_plans([quick], np.zeros(2)))
     assert (again.source, again.expansions) == ("recalled", 0)
+
+
+@pytest.mark.parametrize("assist", ["closed", "open", "repair"])
+def test_a_recalled_plan_fits_whatever_is_left_of_the_current_plan(memory, assist):
+    recalled = first(problem_of([]), "gust", assist, 5, memory)
+    attempt = first(problem_of([]), "gust", assist, 5, memory, current=recalled.plan)
+    assert (recalled.source, attempt.source) == ("recalled", "kept")
+    assert (recalled.hit, attempt.hit) == (True, True)
+    missed = first(blocked_everywhere(), "gust", assist, 5, memory, current=recalled.plan)
+    assert missed.hit is False
 
 
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
@@ -232,6 +243,20 @@ def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(assis
     assert faults(problem, attempt.plan) == []
     assert any((attempt.plan.states[:5] == memory.plans[i].states[:5]).all() for i in attempt.recalled)
     assert attempt.repair_seconds > 0.0
+
+
+def test_repairs_and_the_rest_of_the_current_plan_are_timed_together(memory, monkeypatch):
+    def slow_rest(*_):
+        time.sleep(0.2)
+
+    blocking = [box(*stored.states[120, :2], 0.0, 1.2, 1.2) for stored in memory.plans]
+    monkeypatch.setattr("planners.solve.rest_of", slow_rest)
+    with early_help():
+        attempt = first(
+            problem_of(blocking, "each plan blocked"), "rrt", "repair", 5, memory, current=memory.plans[0]
+        )
+    assert attempt.source == "repaired"
+    assert attempt.repair_seconds > 0.2
 
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
