@@ -11,7 +11,7 @@ from prefect import task
 from motion_memory.answers import Answer
 from motion_memory.loading import load
 from motion_memory.memory import Memory
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
 
 
 @functools.cache
@@ -26,6 +26,7 @@ def plan_task(
     *,
     time_limit: float | None = None,
     improve_seconds: float = 0.0,
+    current: Plan | None = None,
     **options: Any,
 ) -> Answer:
     """Plan for one problem; each worker process loads a memory once.
@@ -35,11 +36,12 @@ def plan_task(
         memory: as for ``load``.
         time_limit: as for ``Memory.plan``.
         improve_seconds: as for ``Memory.plan``.
+        current: as for ``Memory.plan``.
         options: of ``load``, such as ``planner="gust"``.
 
     Raises:
-        ValueError: The problem is malformed or impossible.
+        ValueError: The problem is malformed or impossible, or the current plan cannot be driven.
         PlanFaultError: The independent judge refuses the plan.
     """
     planner = _loaded(memory, tuple(sorted(options.items())))
-    return planner.plan(problem, time_limit=time_limit, improve_seconds=improve_seconds)
+    return planner.plan(problem, time_limit=time_limit, improve_seconds=improve_seconds, current=current)
