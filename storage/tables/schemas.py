@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import pyarrow as pa
 
 GRID_BYTES: Final = 512  # 64 x 64 cells, one bit each
 
-_PROBLEM: Final = [
+
+def _optional(name: str, kind: pa.DataType) -> pa.Field:
+    """A column that rows, and files of earlier versions, may lack."""
+    return pa.field(name, kind, metadata={"optional": "yes"})
+
+
+def _schema(name: str, fields: Sequence[tuple[str, pa.DataType] | pa.Field], **metadata: str) -> pa.Schema:
+    columns = [field if isinstance(field, pa.Field) else pa.field(*field) for field in fields]
+    return pa.schema(columns, metadata={"schema": name, **metadata})
+
+
+_POSES: Final = [
     ("id", pa.string()),
     ("class", pa.string()),
     ("start", pa.list_(pa.float64())),  # x m, y m, heading rad
     ("goal", pa.list_(pa.float64())),  # x m, y m
-    ("goal_radius", pa.float64()),  # m
-    ("bounds", pa.list_(pa.float64())),  # x_min, y_min, x_max, y_max, m
-    ("scale", pa.float64()),  # metres of the world outside a metre here; null: 1
 ]
+_RADIUS: Final = ("goal_radius", pa.float64())  # m
+_BOUNDS: Final = ("bounds", pa.list_(pa.float64()))  # x_min, y_min, x_max, y_max, m
+_SCALE: Final = ("scale", pa.float64())  # metres of the world outside a metre here; null: 1
+_PROBLEM: Final = [*_POSES, _RADIUS, _BOUNDS, _SCALE]
 
 # Flat: a list of lists of lists costs ten times as much to read
 _GEOMETRY: Final = [
@@ -25,48 +38,29 @@ _GEOMETRY: Final = [
     ("obstacle_starts", pa.list_(pa.int32())),
 ]
 
-
-def _schema(
-    name: str, fields: list[tuple[str, pa.DataType]], optional: tuple[str, ...] = (), **metadata: str
-) -> pa.Schema:
-    marked = [
-        pa.field(field, kind, metadata={"optional": "yes"} if field in optional else None)
-        for field, kind in fields
-    ]
-    return pa.schema(marked, metadata={"schema": name, **metadata})
-
-
 IMPORTED: Final = _schema("imported/1", [*_PROBLEM, *_GEOMETRY])
 
-# The contract's table of problems: what users hand in and receive, nested as in JSON.
+# The contract's table of problems: what users hand in and receive, nested as in JSON. Lengths are those of
+# the world outside.
 PROBLEMS: Final = _schema(
     "problems/1",
     [
-        *_PROBLEM,
+        *_POSES,
+        _optional(*_RADIUS),
+        _BOUNDS,
+        _optional(*_SCALE),
         ("obstacles", pa.list_(pa.list_(pa.list_(pa.float64())))),  # polygons of [x, y], m
-        ("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
-        ("start_speed", pa.float64()),  # m/s
-        ("start_steering", pa.float64()),  # rad
-        ("start_turn_rate", pa.float64()),  # rad/s
-        ("start_hitch", pa.list_(pa.float64())),  # rad
-        ("goal_tolerance", pa.list_(pa.float64())),  # m, rad
-        ("goal_speed", pa.list_(pa.float64())),  # least and most, m/s
-        ("goal_hitch", pa.list_(pa.float64())),  # rad
-        ("goal_hitch_tolerance", pa.list_(pa.float64())),  # rad
-        ("vehicle", pa.string()),  # its name, or all of it as JSON
+        _optional("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
+        _optional("start_speed", pa.float64()),  # m/s
+        _optional("start_steering", pa.float64()),  # rad
+        _optional("start_turn_rate", pa.float64()),  # rad/s
+        _optional("start_hitch", pa.list_(pa.float64())),  # rad
+        _optional("goal_tolerance", pa.list_(pa.float64())),  # m, rad
+        _optional("goal_speed", pa.list_(pa.float64())),  # least and most, m/s
+        _optional("goal_hitch", pa.list_(pa.float64())),  # rad
+        _optional("goal_hitch_tolerance", pa.list_(pa.float64())),  # rad
+        _optional("vehicle", pa.string()),  # its name, or all of it as JSON
     ],
-    optional=(
-        *(
-            "groups",
-            "scale",
-            "goal_radius",
-            "start_speed",
-            "start_steering",
-            "start_turn_rate",
-            "start_hitch",
-        ),
-        *("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance", "vehicle"),
-    ),  # lengths are those of the world outside here
 )
 
 _ARRIVAL: Final = pa.struct(  # ``planners.world.problem.Arrival``
@@ -119,12 +113,12 @@ ATTEMPTS: Final = _schema(
         ("problem_id", pa.string()),
         ("problem_class", pa.string()),
         ("planner", pa.string()),
-        ("assist", pa.string()),  # none, closed, open, repair, fresh, random-...
+        ("assist", pa.string()),  # one of ``configurations.ASSISTS``
         ("top_k", pa.int32()),
         ("memory", pa.string()),
         ("status", pa.string()),
         ("solved", pa.bool_()),
-        ("source", pa.string()),  # recalled, repaired, searched; null if there is no plan
+        ("source", pa.string()),  # as ``planners.attempt.Attempt`` has it; null if there is no plan
         ("planning_seconds", pa.float64()),  # in all, measured once around everything
         ("occupancy_seconds", pa.float64()),
         ("encode_seconds", pa.float64()),
@@ -142,25 +136,15 @@ ATTEMPTS: Final = _schema(
         ("run_id", pa.string()),
         ("commit", pa.string()),
         ("host", pa.string()),
-        ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
-        ("guide_seconds", pa.float64()),  # finding a way over the grid, or along a recalled plan
-        ("repair_seconds", pa.float64()),  # fitting a plan that is at hand to the problem, or trying to
-        ("verified", pa.bool_()),  # what the authority said of the plan; null if there is none
-        ("vehicle", pa.string()),  # its name
-        ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
-        ("hit", pa.bool_()),  # whether recalled plans answer it as they are; null without memory
-        ("polished", pa.bool_()),  # whether its plan is polished, as answers are, or as it was found
+        _optional("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
+        _optional("guide_seconds", pa.float64()),  # finding a way over the grid, or along a recalled plan
+        _optional("repair_seconds", pa.float64()),  # fitting a plan that is at hand, or trying to
+        _optional("verified", pa.bool_()),  # what the authority said of the plan; null if there is none
+        _optional("vehicle", pa.string()),  # its name
+        _optional("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
+        _optional("hit", pa.bool_()),  # whether recalled plans answer it as they are; null without memory
+        _optional("polished", pa.bool_()),  # whether its plan is polished, as answers are, or as it was found
     ],
-    optional=(
-        "scene_seconds",
-        "guide_seconds",
-        "repair_seconds",
-        "verified",
-        "vehicle",
-        "recall",
-        "hit",
-        "polished",
-    ),
 )
 
 
@@ -179,12 +163,11 @@ WATCHED: Final = _schema(
         ("p_value", pa.float64()),  # of so few hits by chance
         ("has_fallen", pa.bool_()),
         # mean of planning and driving where solved; null: not known
-        ("total_s", pa.float64()),
-        ("benchmark_total_s", pa.float64()),
-        ("later_p_value", pa.float64()),  # of so long total times by chance
-        ("is_later", pa.bool_()),
+        _optional("total_s", pa.float64()),
+        _optional("benchmark_total_s", pa.float64()),
+        _optional("later_p_value", pa.float64()),  # of so long total times by chance
+        _optional("is_later", pa.bool_()),
     ],
-    optional=("total_s", "benchmark_total_s", "later_p_value", "is_later"),
 )
 
 
