@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # its import takes half a second, and who reads rows needs on
 WITHOUT_MEMORY = ("none", "fresh")  # the assists whose top k is 0
 SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a library or from a memory ...
 DRIVES = "drives"  # ... if a whole plan was moved to the problem
+SOURCES: Final = ("recalled", "repaired", "searched")  # of plans that are made for a problem
 FROM_MEMORY: Final = ("recalled", "repaired")  # sources of answers that a memory gave
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
 KEPT: Final = "kept"  # the source of what is left of the plan that is being driven
@@ -28,7 +29,7 @@ class Attempt:
     top_k: int  # 0 without memory
     status: str
     solved: bool
-    source: str | None  # "recalled", "repaired", "searched" or "kept"; None if not solved
+    source: str | None  # one of ``SOURCES``, or ``KEPT``; None if not solved
     planning_seconds: float
     occupancy_seconds: float
     encode_seconds: float

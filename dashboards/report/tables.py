@@ -25,6 +25,7 @@ from dashboards.cells import (
 )
 from dashboards.statistics.panels import PLANNERS, ranked
 from dashboards.verdicts.claim_rules import Claim
+from planners.attempt import SOURCES
 from storage.tables.configurations import configurations_in
 
 Row = Mapping[Any, Any]  # of a summary
@@ -33,7 +34,6 @@ _HEADINGS: Final = (
     "planner", "configuration", "solved", "mean", "reduction % [95 %]", "slower", "hits", "drives",
     "sooner [95 %]",
 )  # fmt: skip
-SOURCES: Final = ("recalled", "repaired", "searched")
 _FIELDS: Final = (
     "planner", "configuration", "solved_percent", "planning_mean_ms", "reduction_percent", "slower_percent",
     "hits_percent", "driving_s", "sooner_s",

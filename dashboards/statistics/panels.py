@@ -22,6 +22,7 @@ from dashboards.statistics.intervals import (
     ratio,
 )
 from dashboards.statistics.sign_tests import holm, signs
+from planners.attempt import SOURCES
 from planners.world.arrays import Flags, Floats
 from storage.tables.configurations import Configuration, configured
 
@@ -206,7 +207,7 @@ COLUMNS: Final = (
     "interquartile_mean_ms", "interquartile_mean_low_ms", "interquartile_mean_high_ms",
     "median_ms", "median_low_ms", "median_high_ms", "p90_ms", "p90_low_ms", "p90_high_ms",
     "reduction", "reduction_low", "reduction_high", "slower", "slowdown", "p_value",
-    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "hit", "recalled", "repaired", "searched",
+    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "hit", *SOURCES,
     "collision_checks",
 )  # fmt: skip
 
@@ -236,7 +237,7 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     table["problems"] = (~np.isnan(times)).sum(axis=0)
     table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
     table["hit"] = np.nanmean(panel.hits(), axis=0)
-    for source in ("recalled", "repaired", "searched"):  # what the plans of the problems are
+    for source in SOURCES:  # what the plans of the problems are
         of_source = panel.rows.assign(is_so=panel.rows["source"] == source)
         table[source] = np.nanmean(panel._replace(rows=of_source).matrix("is_so"), axis=0)
     table["collision_checks"] = np.nanmean(panel.matrix("collision_checks"), axis=0)

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from planners.attempt import KEPT, NEW, Attempt
+from planners.attempt import KEPT, NEW, SOURCES, Attempt
 from planners.routes.legs import Leg, joined
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
-SOURCES: Final = (KEPT, "recalled", "repaired", "searched")  # of legs
+LEG_SOURCES: Final = (KEPT, *SOURCES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Route:
     @property
     def source(self) -> str:
         """Where it comes from: "searched" if any leg was, else "repaired", "recalled", or else "kept"."""
-        return max((leg.source for leg in self.legs), key=SOURCES.index, default="searched")
+        return max((leg.source for leg in self.legs), key=LEG_SOURCES.index, default="searched")
 
     def new_attempts(self, scale: float) -> list[tuple[Problem, Attempt]]:
         """Each local problem whose plan no memory had, once and without a name, and how it was solved.

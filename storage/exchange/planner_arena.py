@@ -16,13 +16,13 @@ from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
+from planners.attempt import SOURCES
 from planners.search.outcome import Status
 from planners.search.query import Limits
 from storage.tables.attempts import attempt_frames
 from storage.tables.configurations import Configuration, configured
 
 LIBRARY: Final = "Motion-Memory"
-SOURCES: Final = ("recalled", "repaired", "searched")
 _SECONDS: Final = (
     "occupancy_seconds", "encode_seconds", "recall_seconds", "scene_seconds", "check_seconds",
     "guide_seconds", "repair_seconds", "roadmap_seconds", "search_seconds",

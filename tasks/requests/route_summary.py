@@ -11,7 +11,7 @@ from planners.attempt import FROM_MEMORY, WITHOUT_MEMORY
 from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
-from planners.routes.route import SOURCES, Route
+from planners.routes.route import LEG_SOURCES, Route
 from planners.world.arrays import Floats
 from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
 from planners.world.problem import Plan, start_state
@@ -81,7 +81,7 @@ def route_summary(
     if not legs:
         return ["The vehicle is there already: nothing has to be driven."]
     by_source = {
-        source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
+        source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in LEG_SOURCES
     }
     has_memory = assistant.settings.assist not in WITHOUT_MEMORY
     from_memory = legs_from_memory(route)

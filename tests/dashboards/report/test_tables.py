@@ -12,7 +12,6 @@ from dashboards.report.retrieval_tables import retrieval_markdown, retrieval_tab
 from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
-    SOURCES,
     as_csv,
     experience_table,
     full_cells,
@@ -22,6 +21,7 @@ from dashboards.report.tables import (
 from dashboards.statistics.panels import summarise
 from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_retrieval
 from flows.cli.terminal import write
+from planners.attempt import SOURCES
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
 
