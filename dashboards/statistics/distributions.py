@@ -93,9 +93,7 @@ def _leading(panel: Panel) -> list[int]:
 
 
 def _mean_ms(panel: Panel, column: str) -> Floats:
-    """Means ``[columns]`` of a column of seconds, in milliseconds; 0 where the rows do not hold it."""
-    if column not in panel.rows:
-        return np.zeros(len(panel.columns))
+    """Means ``[columns]`` of a column of seconds, in milliseconds; 0 where no row says it."""
     values = 1e3 * panel.matrix(column)
     means = ratio(np.nansum(values, axis=0), np.count_nonzero(~np.isnan(values), axis=0).astype(float))
     return np.nan_to_num(means)

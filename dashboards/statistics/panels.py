@@ -190,8 +190,6 @@ def hits_of(attempts: pd.DataFrame) -> Flags:
     Rows of earlier versions do not say so: there it is where a recalled plan is the answer.
     """
     answers = attempts["source"] == "recalled"
-    if "hit" not in attempts:
-        return answers.to_numpy(bool)
     return attempts["hit"].where(attempts["hit"].notna(), answers).to_numpy(bool)
 
 

@@ -160,8 +160,8 @@ def verdict(rows: pd.DataFrame) -> str:
 def _paired(first: pd.DataFrame, other: pd.DataFrame) -> list[_Sides]:
     """The panels in which both attempted the same problems in the same ways."""
     shared = np.intersect1d(first["problem_id"], other["problem_id"])
-    if not all("hit" in rows and rows["hit"].notna().any() for rows in (first, other)):
-        first, other = (rows.drop(columns="hit", errors="ignore") for rows in (first, other))
+    if not all(rows["hit"].notna().any() for rows in (first, other)):
+        first, other = (rows.assign(hit=None) for rows in (first, other))
     before, after = (
         {panel.name: panel for panel in panels(rows[rows["problem_id"].isin(shared)])}
         for rows in (first, other)

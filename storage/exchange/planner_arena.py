@@ -157,14 +157,14 @@ def _add_experiment(
 def _rows(attempts: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
     """Planner name, planner settings and ``PROPERTIES`` of each attempt; unknown values are None."""
     rows, configurations = configured(attempts)
-    keys = pd.DataFrame({name: rows.get(name) for name in ("planner", "configuration", "memory", "vehicle")})
-    group, distinct = pd.factorize(pd.MultiIndex.from_frame(keys))
+    keys = ["planner", "configuration", "memory", "vehicle"]
+    group, distinct = pd.factorize(pd.MultiIndex.from_frame(rows[keys]))
     names = [_name_and_settings(configurations, *key) for key in distinct]
     table = rows.assign(solved=rows["solved"].astype(int), memory=None)
     table["problem_id"] = [" ".join(id_.split()).replace("; ", ";") for id_ in rows["problem_id"]]
     for name, texts in enums().items():
         table[name] = table[name].map({text: i for i, text in enumerate(texts)})
-    table = pd.DataFrame({name: table.get(_MEANT.get(name, name)) for name in PROPERTIES}, rows.index)
+    table = pd.DataFrame({name: table[_MEANT.get(name, name)] for name in PROPERTIES}, rows.index)
     values = table.astype(object).where(table.notna(), None).itertuples(index=False, name=None)
     return ((*names[i], *row) for i, row in zip(group, values, strict=True))
 

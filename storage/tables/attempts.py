@@ -11,7 +11,7 @@ import pyarrow as pa
 from storage.errors import StorageError
 from storage.places.mirror import files_in
 from storage.tables.schemas import ATTEMPTS
-from storage.tables.shards import columns_of, read_table, table_of, write_table, write_tables
+from storage.tables.shards import read_table, table_of, write_table, write_tables
 
 BATCH_ROWS: Final = 4096
 
@@ -85,7 +85,7 @@ def attempt_frames(path: Path, without: Sequence[str] = ()) -> Iterator[pd.DataF
 
 def _tables(path: Path, without: Sequence[str]) -> Iterator[pa.Table]:
     for file in tables_below(path, "benchmark"):
-        yield read_table(file, ATTEMPTS, [name for name in columns_of(file) if name not in without])
+        yield read_table(file, ATTEMPTS, [name for name in ATTEMPTS.names if name not in without])
 
 
 def tables_below(path: Path, stage: str) -> list[Path]:
@@ -104,23 +104,22 @@ def tables_below(path: Path, stage: str) -> list[Path]:
 def readable_attempts(folder: Path, names: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
     """The columns ``names`` of all attempts below a ``folder`` that can be read.
 
-    Texts are categories, so a run of half a million rows takes tens of megabytes. A column that a file lacks
-    holds missing values.
+    Texts are categories, so a run of half a million rows takes tens of megabytes.
 
     Returns the rows, and a line for each file that cannot be read. Raises StorageError if no file can.
     """
     tables, faults = [], []
     for path in tables_below(folder, "benchmark"):
         try:
-            tables.append(read_table(path, ATTEMPTS, [name for name in names if name in columns_of(path)]))
+            tables.append(read_table(path, ATTEMPTS, names))
         except StorageError as error:
             faults.append(str(error))
     if not tables:
         raise StorageError(f"none of the files in {folder} can be read; the first fault: {faults[0]}")
-    rows = pa.concat_tables(tables, promote_options="default")
+    rows = pa.concat_tables(tables)
     for number, field in enumerate(rows.schema):
         if pa.types.is_string(field.type):
             column = rows.column(number).combine_chunks().dictionary_encode()
             rows = rows.set_column(number, field.name, column)
     frame: pd.DataFrame = rows.to_pandas()
-    return frame.reindex(columns=list(names)), faults
+    return frame, faults

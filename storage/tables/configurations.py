@@ -54,13 +54,13 @@ BASELINE: Final = Configuration("none", "", 0)
 def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configuration]]:
     """``attempts`` with a categorical column ``configuration`` of labels.
 
-    Rows that were written before there was a field ``recall`` count as ranked by the encoder, those from
-    before ``polished`` as found.
+    Rows of versions that knew no ``recall`` count as ranked by the encoder, those that do not say whether
+    their plan is ``polished`` as found.
 
     Returns the rows, and the configurations by label, in reading order.
     """
-    keys = pd.DataFrame({name: attempts.get(name) for name in _KEYS}, attempts.index)
-    keys = keys.assign(polished=_is_polished(keys))
+    keys = attempts[list(_KEYS)]
+    keys = keys.assign(polished=keys["polished"].eq(True))
     distinct = keys.drop_duplicates()
     configurations = [_understood(*row) for row in distinct.itertuples(index=False, name=None)]
     by_label = {each.label: each for each in sorted(set(configurations), key=lambda each: each.rank)}
@@ -79,18 +79,12 @@ def configurations_in(table: pd.DataFrame) -> list[Configuration]:
 
 def as_found(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of a ``table`` of attempts, or of their summary, whose plans are as they were found."""
-    return table[~_is_polished(table)]
+    return table[~table["polished"].eq(True)]  # rows of earlier versions do not say so
 
 
 def as_returned(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of a ``table`` of attempts, or of their summary, whose plans are polished, as answers are."""
-    return table[_is_polished(table)]
-
-
-def _is_polished(table: pd.DataFrame) -> pd.Series[bool]:
-    """Whether each row says so; those of earlier versions do not."""
-    column = table["polished"] if "polished" in table else pd.Series(False, table.index)
-    return column.eq(True)
+    return table[table["polished"].eq(True)]
 
 
 def _understood(assist: str, top_k: float, recall: object, polished: bool) -> Configuration:

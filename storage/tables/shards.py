@@ -62,22 +62,24 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
     Args:
         path: the file to read.
         schema: the schema that it was written with.
-        columns: those to read; None for all. Columns that a file of an earlier version lacks are left out.
+        columns: those to read; None for all. An optional one that the file lacks, since an earlier version
+            wrote it, holds nulls.
 
     Raises:
         StorageError: the file is missing, damaged, of another kind or version, or has a column of another
             type.
     """
-    wanted = schema.metadata[SCHEMA_KEY].decode()
-    name = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
+    wanted, written = schema.metadata[SCHEMA_KEY].decode(), _schema_in(path)
+    name = (written.metadata or {}).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
     if name not in (wanted, EARLIER.get(wanted)):
         raise StorageError(
             f"{path} holds table {name}, expected {wanted}; is it the right file, written by this version?"
         )
+    lacking = [name for name in _optional_names(schema) if name not in written.names]
     with sound(path):
         table = pq.read_table(
             fetch(path),
-            columns=None if columns is None else list(columns),
+            columns=None if columns is None else [each for each in columns if each not in lacking],
             partitioning=None,
             page_checksum_verification=True,
         )
@@ -86,7 +88,22 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
                 raise ValueError(
                     f"column {field.name} holds {field.type}, expected {schema.field(field.name).type}"
                 )
-        return table if name == wanted else _renamed(table)
+        table = table if name == wanted else _renamed(table)
+        return _with_nulls(table, schema, lacking, columns) if lacking else table
+
+
+def _optional_names(schema: pa.Schema) -> list[str]:
+    return [field.name for field in schema if (field.metadata or {}).get(b"optional")]
+
+
+def _with_nulls(
+    table: pa.Table, schema: pa.Schema, lacking: Sequence[str], columns: Sequence[str] | None
+) -> pa.Table:
+    """A ``table`` with nulls in the columns that it is ``lacking``, in the order of a file that has them."""
+    for name in lacking:
+        table = table.append_column(schema.field(name), pa.nulls(len(table), schema.field(name).type))
+    in_order = [*schema.names, *table.column_names] if columns is None else columns
+    return table.select([name for name in dict.fromkeys(in_order) if name in table.column_names])
 
 
 def _renamed(table: pa.Table) -> pa.Table:
@@ -126,18 +143,18 @@ def columns_of(path: Path) -> dict[str, str]:
 
     Raises StorageError if it is missing or damaged.
     """
-    with sound(path):
-        try:
-            return {field.name: str(field.type) for field in pq.read_schema(fetch(path))}
-        except FileNotFoundError:
-            raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
+    return {field.name: str(field.type) for field in _schema_in(path)}
 
 
 def metadata_of(path: Path) -> dict[bytes, bytes]:
     """The metadata of the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
+    return dict(_schema_in(path).metadata or {})
+
+
+def _schema_in(path: Path) -> pa.Schema:
     with sound(path):
         try:
-            return dict(pq.read_schema(fetch(path)).metadata or {})
+            return pq.read_schema(fetch(path))
         except FileNotFoundError:
             raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
 
@@ -165,7 +182,7 @@ def table_of(rows: Sequence[dict[str, Any]], schema: pa.Schema, what: str) -> pa
         StorageError: a row's fields or types do not fit.
     """
     names = set(schema.names)
-    required = {field.name for field in schema if not (field.metadata or {}).get(b"optional")}
+    required = names - set(_optional_names(schema))
     for number, row in enumerate(rows):
         wrong = sorted(set(row) - names) + sorted(required - set(row))
         if wrong:

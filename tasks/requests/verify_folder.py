@@ -256,7 +256,7 @@ def _attempts(
                 vehicle=vehicle,
                 strategy=row["recall"],
                 workspace=workspace,
-                polished=row.get("polished") is True,  # rows of earlier versions do not say so
+                polished=row["polished"] is True,  # rows of earlier versions do not say so
             )
             attempt = check_attempt(problem, attempt, set(), vehicle)
             attempts_repeated += 1

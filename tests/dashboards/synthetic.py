@@ -55,6 +55,7 @@ def attempts(
                     "status": "solved" if solved else "budget-spent",
                     "solved": solved,
                     "source": ("recalled" if recalled else "searched") if solved else None,
+                    "hit": None,
                     "planning_seconds": seconds,
                     **{f"{part}_seconds": share for part, share in zip(PARTS, parts, strict=True)},
                     "collision_checks": int(1e6 * seconds),

@@ -16,10 +16,10 @@ def _summary(
     sooner: tuple[float, float, float], reduction: tuple[float, float, float] = (0.5, 0.4, 0.6)
 ) -> pd.DataFrame:
     alone = {
-        "panel": "trap", "planner": "gust", "assist": "none", "recall": "", "top_k": 0, "problems": 50,
-        "solved": 1.0, "mean_ms": 1.0, "driving_s": 20.0, "sooner_s": 0.0, "sooner_low_s": 0.0,
-        "sooner_high_s": 0.0, "recalled": 0.0, "repaired": 0.0, "reduction": 0.0, "reduction_low": 0.0,
-        "reduction_high": 0.0,
+        "panel": "trap", "planner": "gust", "assist": "none", "recall": "", "top_k": 0, "polished": False,
+        "problems": 50, "solved": 1.0, "mean_ms": 1.0, "driving_s": 20.0, "sooner_s": 0.0,
+        "sooner_low_s": 0.0, "sooner_high_s": 0.0, "recalled": 0.0, "repaired": 0.0, "reduction": 0.0,
+        "reduction_low": 0.0, "reduction_high": 0.0,
     }  # fmt: skip
     value, low, high = sooner
     less = dict(zip(("reduction", "reduction_low", "reduction_high"), reduction, strict=True))

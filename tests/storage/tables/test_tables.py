@@ -12,10 +12,18 @@ from hypothesis import strategies as st
 from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, VEHICLES, Vehicle, name_of
 from storage.errors import StorageError
-from storage.tables.attempts import attempt_columns, read_attempts, write_attempts
+from storage.tables.attempts import (
+    attempt_columns,
+    attempt_records,
+    join_attempts,
+    read_attempts,
+    readable_attempts,
+    write_attempts,
+)
 from storage.tables.experiences import merge_experiences, read_experiences, write_experiences
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, write_hallucinated
 from storage.tables.recalls import read_recalls, write_recalls
+from storage.tables.schemas import ATTEMPTS
 from tests.storage.samples import box, experiences, plan, problem_with, quick, same_plan, same_problem
 
 OTHERS = [vehicle for vehicle in VEHICLES.values() if vehicle != CAR]
@@ -217,6 +225,36 @@ def test_attempts_of_a_folder_come_back_in_the_order_of_their_files(tmp_path: Pa
     assert np.isnan(frame["length_m"][2])
     assert frame["verified"][1] is True
     assert len(read_attempts(tmp_path / "curves" / "0001.parquet")) == 1
+
+
+OPTIONAL = [field for field in ATTEMPTS if field.metadata]
+
+
+def test_columns_that_earlier_versions_did_not_write_are_read_as_missing_values(tmp_path: Path) -> None:
+    paths = [tmp_path / "0000.parquet", tmp_path / "0001.parquet"]
+    for path in paths:
+        write_attempts(path, [{**ATTEMPT, "hit": True, "vehicle": "car"}, FAILED])
+    pq.write_table(pq.read_table(paths[0]).drop_columns([field.name for field in OPTIONAL]), paths[0])
+    assert len(OPTIONAL) > 4
+    for field in OPTIONAL:
+        assert attempt_columns(paths[0], [field.name, "seed"]) == {field.name: [None, None], "seed": [1, 1]}
+    rows, now = (read_attempts(path) for path in (tmp_path, paths[1]))
+    assert list(rows.columns) == list(now.columns)
+    assert rows["hit"].tolist() == [None, None, True, None]
+    assert np.isnan(rows["scene_seconds"][:2]).all()
+    readable, faults = readable_attempts(tmp_path, ["hit", "planner"])
+    assert (readable["hit"].tolist(), faults) == ([None, None, True, None], [])
+    join_attempts(tmp_path / "all.parquet", paths)
+    assert len(read_attempts(tmp_path / "all.parquet")) == 4
+    assert set(attempt_records(paths[0])[0]) == set(ATTEMPTS.names)
+
+
+def test_a_column_that_each_version_wrote_is_not_made_up(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    write_attempts(path, [ATTEMPT])
+    pq.write_table(pq.read_table(path).drop_columns(["solved"]), path)
+    with pytest.raises(StorageError, match="solved"):
+        read_attempts(path)
 
 
 def test_a_folder_without_attempts_says_what_to_run(tmp_path: Path) -> None:
