@@ -1,1 +1,1 @@
-"""Routes over a map: local problems one after another, joined where the vehicle rests."""
+"""Routes over a map: local problems one after another, joined in motion, at rest only at the stops."""

@@ -1,4 +1,4 @@
-"""The planners by name. A new one is a file and a line here."""
+"""The planners by name. docs/architecture.md says what a new one needs."""
 
 from __future__ import annotations
 
