@@ -146,3 +146,15 @@ def test_each_command_is_accepted_by_its_program(page: Path) -> None:
 def test_a_command_that_its_program_would_refuse_is_found(words: list[str]) -> None:
     with pytest.raises(Exception):  # noqa: B017, PT011  # each program has its own
         PROGRAMS[words[0]](words[1:])
+
+
+def test_the_page_of_commands_names_each_of_them_and_no_option_that_it_does_not_take() -> None:
+    """Options may be missing there: the page refers to ``--help``."""
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    table = page.partition("| command | does |\n|---|---|\n")[2].partition("\n\n")[0]
+    usages = [usage for row in table.splitlines() for usage in re.findall("`([^`]+)`", row.split(" | ")[0])]
+    assert {usage.split()[0] for usage in usages} == {name for name in app if not name.startswith("-")}
+    for usage in usages:
+        name = usage.split()[0]
+        taken = {option for argument in app[name].assemble_argument_collection() for option in argument.names}
+        assert set(re.findall("--[a-z-]+", usage)) <= taken, usage
