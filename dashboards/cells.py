@@ -19,6 +19,13 @@ NAMES: Final = {  # headings of columns that are aligned to the left
     "stage", "planner", "configuration", "panel", "class", "memory", "protocol", "recall", "setting",
     "verdict", "source", "use",
 }  # fmt: skip
+USES: Final = {  # of a recalled plan, as ``planners.explanation`` names them
+    "answer": "the answer",
+    "polished": "the answer, polished",
+    "repaired": "repaired",
+    "guide": "guided the search",
+    "": "",
+}
 PLANNING_TIME: Final = (
     "Planning time is everything from receiving the obstacles to returning a plan: drawing the grid, "
     "encoding, recall, checking recalled plans, guides and repair, the planner's own structures, search. One "

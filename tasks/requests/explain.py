@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
-from dashboards.cells import NOTHING, Cell, CellTable
+from dashboards.cells import NOTHING, USES, Cell, CellTable
 from planners.attempt import KEPT, Attempt
 from planners.drive_answers import DriveAnswer
 from planners.explanation import Recollection
@@ -16,13 +16,6 @@ from planners.memory.memory import Memory
 from planners.sub_plan_answers import SubPlanAnswer
 from planners.world.problem import Plan, Problem
 
-USES: Final = {
-    "answer": "the answer",
-    "polished": "the answer, polished",
-    "repaired": "repaired",
-    "guide": "guided the search",
-    "": "",
-}
 BETTER: Final = {  # what the answer is instead of what the memory has, by its source
     KEPT: "what is left of the current plan costs no more",
     "searched": "the search found a quicker drive",

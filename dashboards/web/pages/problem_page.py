@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from dashboards.cells import NOTHING, planner_title
+from dashboards.cells import NOTHING, USES, planner_title
 from dashboards.web.attempt_rows import equals
 from dashboards.web.data_reader import DataReader
 from dashboards.web.notices import MissingError, NoticeError
@@ -32,13 +32,6 @@ from storage.places.run_folder import RunFolder
 from storage.tables.configurations import Configuration
 
 SECONDS: Final = 5.0  # that it may take to make an attempt again
-USES: Final = {
-    "answer": "is the answer",
-    "polished": "is the answer, polished",
-    "repaired": "was repaired",
-    "guide": "guided the search",
-    "": NOTHING,
-}
 _KEYS: Final = {"problem": "problem_id", "by": "planner", "how": "configuration", "with": "memory"}
 
 Row = Mapping[Any, Any]  # of an attempt
@@ -158,7 +151,7 @@ def _recalled(replayed: Replay, scale: float) -> list[dict[str, Any]]:
             NOTHING if first is None else f"({x:.1f}, {y:.1f})",
         ]
         beaten = recollection.is_free and not recollection.use
-        use = "fits, but is not the answer" if beaten else USES[recollection.use]
+        use = "fits, but is not the answer" if beaten else USES[recollection.use] or NOTHING
         table.append({"order": order, "numbers": numbers, "use": use})
     return table
 
