@@ -25,7 +25,7 @@ from storage.tables.columns import (
     problems_of,
 )
 from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import SCHEMA_KEY, metadata_of, read_table, sound, write_table
+from storage.tables.shards import SCHEMA_KEY, metadata_of, read_table, shard_is_done, sound, write_table
 from storage.vehicles.definitions import definition_of
 from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
@@ -142,6 +142,14 @@ def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
     table = read_table(path, EXPERIENCES)
     refuse_another(path, _recorded(path), vehicle)
     return table
+
+
+def experiences_are_done(shard: Path, key: str) -> bool:
+    """Whether all of a ``shard`` of experiences can be read, and it was made from ``key``."""
+    try:
+        return shard_is_done(shard, key) and read_table(shard, EXPERIENCES) is not None
+    except StorageError:
+        return False
 
 
 def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:

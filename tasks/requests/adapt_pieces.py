@@ -14,11 +14,11 @@ from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_memory_or_library
-from storage.tables.experiences import write_experiences
+from storage.tables.experiences import experiences_are_done, write_experiences
 from storage.vehicles.definitions import definition_of
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.part_folder import NumberedPiece, is_readable
+from tasks.requests.part_folder import NumberedPiece
 
 PIECE: Final = 25  # plans: a few seconds of work
 
@@ -96,7 +96,7 @@ ADAPT: Final = Job(
     do=adapt_piece,
     result=Driven,
     output=lambda piece: piece.shard,
-    is_whole=is_readable,
+    is_whole=experiences_are_done,
     units=lambda piece: len(piece.numbers),
     unit="plans",
 )

@@ -21,13 +21,13 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
 from planners.world.workspace import Workspace
-from storage.tables.experiences import write_experiences
+from storage.tables.experiences import experiences_are_done, write_experiences
 from storage.vehicles.definitions import definition_of
 from storage.worlds.importing import ImportSettings
 from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import digest_of, key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.part_folder import NumberedPiece, is_readable
+from tasks.requests.part_folder import NumberedPiece
 from tasks.requests.question_sources import (
     QuestionSource,
     Share,
@@ -127,7 +127,7 @@ GATHER: Final = Job(
     do=gather_piece,
     result=Gathered,
     output=lambda piece: piece.shard,
-    is_whole=is_readable,
+    is_whole=experiences_are_done,
     units=lambda piece: int(min(PIECE, numbers_of(piece.request) - piece.index * PIECE)),
     unit="questions",
 )

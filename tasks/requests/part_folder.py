@@ -12,8 +12,6 @@ from typing import Final, Generic, Protocol, TypeVar
 from storage.errors import StorageError
 from storage.places.data_folder import MARK
 from storage.places.files import locked, remove_contents, remove_leftovers
-from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import read_table, shard_is_done
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.progress import progress
 from tasks.fan_out.stage import AnyPiece, Job, Result
@@ -116,14 +114,6 @@ def do_here(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
             done += job.units(piece)
             show(done)
     return results
-
-
-def is_readable(shard: Path, key: str) -> bool:
-    """Whether all of a shard of experiences can be read, and it was made from ``key``."""
-    try:
-        return shard_is_done(shard, key) and read_table(shard, EXPERIENCES) is not None
-    except StorageError:
-        return False
 
 
 def refuse_existing(out: Path) -> None:
