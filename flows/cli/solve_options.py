@@ -61,16 +61,16 @@ class SolveOptions:
         memory = None if self.memory is None else memory_named(self.memory)
 
         return AssistantSettings(
-            self.planner,
-            assist or (without_memory if memory is None else "repair"),
-            self.top_k,
-            memory,
-            self.seed,
-            settled_vehicle(self.vehicle, problems, memory),
-            improve_seconds,
-            self.recall,
-            not self.unpolished,
-            time_limit,
+            planner=self.planner,
+            assist=assist or (without_memory if memory is None else "repair"),
+            top_k=self.top_k,
+            memory=memory,
+            seed=self.seed,
+            vehicle=settled_vehicle(self.vehicle, problems, memory),
+            improve_seconds=improve_seconds,
+            recall=self.recall,
+            polished=not self.unpolished,
+            time_limit=time_limit,
         )
 
     def vehicle_line(self, settings: AssistantSettings, problems: Path | None = None) -> str:

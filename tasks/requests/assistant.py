@@ -62,12 +62,20 @@ class Assistant:
             UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
             StorageError: the memory lies in object storage and cannot be fetched.
         """
-        planner, assist, top_k, memory, seed, _, improve_seconds, recall, polished, time_limit = settings
-        check_asked(planner, assist, recall, top_k, seed, polished, "top-k")
+        assist, memory = settings.assist, settings.memory
+        check_asked(
+            planner=settings.planner,
+            assist=assist,
+            recall=settings.recall,
+            top_k=settings.top_k,
+            seed=settings.seed,
+            polished=settings.polished,
+            top_k_name="top-k",
+        )
         vehicle = checked_vehicle(settings.vehicle)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
-        check_times(time_limit, improve_seconds, ("--time-limit", "--improve-seconds"))
+        check_times(settings.time_limit, settings.improve_seconds, ("--time-limit", "--improve-seconds"))
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         # files that it may read, which must not be overwritten

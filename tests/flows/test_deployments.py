@@ -19,6 +19,7 @@ from planners.memory.encoder.encoder import NETWORKS
 from planners.memory.recall import STRATEGIES
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS
+from planners.world.classes.families import FAMILIES
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from tasks.champions.drift_watch import DRIFT
 from tasks.champions.retraining_schedule import RUNS, _deployment, as_parameter
@@ -124,6 +125,7 @@ def test_choices_are_those_that_there_are() -> None:
     for offered, there_are in (
         (choices.PresetName, PRESETS),
         (choices.ClassName, CLASSES),
+        (choices.SourceName, (*CLASSES, *FAMILIES)),
         (choices.Difficulty, DIFFICULTIES),
         (choices.ObjectiveName, get_args(Objective)),
         (choices.ContinualName, CONTINUAL),

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
-from flows.cli.choices import SourceName
 from flows.cli.main import call
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
-from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from storage.exchange.problems import read_problems
 from storage.vehicles.vehicle_files import said_vehicle
@@ -42,7 +40,3 @@ def test_classes_can_be_drawn_too_and_a_picture_of_them(tmp_path: Path) -> None:
     drawn = [problem_class("trap").draw(1, index) for index in range(2)]
     assert all(same(*pair) for pair in zip(read_problems(out), drawn, strict=True))
     assert picture.stat().st_size > 5_000
-
-
-def test_choices_of_the_command_line_are_those_there_are() -> None:
-    assert get_args(SourceName) == (*CLASSES, *FAMILIES)
