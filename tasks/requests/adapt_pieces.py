@@ -60,26 +60,26 @@ class Driven(NamedTuple):
     outcomes: list[str]  # of each stored plan
 
 
-def adapt_piece(chunk: AdaptPiece) -> Driven:
+def adapt_piece(piece: AdaptPiece) -> Driven:
     """Drive the plans of a piece with the new vehicle, and write those that the authority accepts."""
-    request, workspace = chunk.request, Workspace()
+    request, workspace = piece.request, Workspace()
     memory = _loaded(request.memory, request.memory_digest, request.old)
     canonical = isinstance(memory, Memory)
     adaptation = Adaptation(request.old, request.new)
     outcomes, kept = [], []
-    for number in chunk.numbers:
+    for number in piece.numbers:
         question = f"{memory.class_name}-{number}" if isinstance(memory, Memory) else memory.questions[number]
         adapted = adaptation.adapted(memory.plans[number], question, canonical, workspace)
         outcomes.append(adapted.outcome.name)
         if adapted.question is not None:
             kept += [Experience(adapted.question, plan, request.new) for plan in adapted.plans]
     write_experiences(
-        chunk.shard,
+        piece.shard,
         kept,
         planners=["adapt"] * len(kept),
         seeds=[0] * len(kept),
         planning_seconds=[0.0] * len(kept),
-        key=chunk.key,
+        key=piece.key,
         vehicle=request.new,
     )
     return Driven(outcomes)

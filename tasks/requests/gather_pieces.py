@@ -92,15 +92,15 @@ class Gathered(NamedTuple):
     rows: list[int]  # for each plan in the shard the number of its question
 
 
-def gather_piece(chunk: GatherPiece) -> Gathered:
+def gather_piece(piece: GatherPiece) -> Gathered:
     """Answer the questions of a piece, and write what is kept of the answers.
 
     Raises JudgementError if the authority refuses a plan.
     """
-    request = chunk.request
+    request = piece.request
     sources, vehicle, workspace = read_sources(request), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
-    for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
+    for number in range(piece.index * PIECE, (piece.index + 1) * PIECE):
         source, own = turn_of(sources, number)
         drawn = source.question(own)
         if drawn is None:
@@ -111,12 +111,12 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
         rows += [number] * len(plans)
         kept += [Experience(question, plan, vehicle) for plan in plans]
     write_experiences(
-        chunk.shard,
+        piece.shard,
         kept,
         planners=[COLLECTOR] * len(kept),
         seeds=[request.settings.seed] * len(kept),
         planning_seconds=[0.0] * len(kept),
-        key=chunk.key,
+        key=piece.key,
         vehicle=vehicle,
     )
     return Gathered(asked, rows)

@@ -133,16 +133,16 @@ def _identity(part: ProblemSlice) -> tuple[str, int, int, int]:
     return part.digest, part.first, part.count, part.offset if part.path.suffix == ".parquet" else 0
 
 
-def solve_part(chunk: FilePart) -> PartResult:
+def solve_part(part: FilePart) -> PartResult:
     """Solve the problems of a part and write their rows; solve none if one of them is malformed."""
-    return solve_part_reporting(chunk, lambda: None)
+    return solve_part_reporting(part, lambda: None)
 
 
-def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> PartResult:
+def solve_part_reporting(part: FilePart, on_problem: Callable[[], object]) -> PartResult:
     """Like ``solve_part``, and call ``on_problem`` after each problem."""
-    request = chunk.request
+    request = part.request
     assistant = _OF_THREAD.assistant(request.settings, request.memory_digest)
-    rows = chunk.rows_begun()
+    rows = part.rows_begun()
     before = len(rows)
     solved: list[Solved] = []
     learned, unlearned = 0, ""
@@ -155,13 +155,13 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
         except (StorageError, OSError) as error:
             unlearned = str(error)
         solved.clear()
-        write_attempts(path, rows, key=chunk.key)
+        write_attempts(path, rows, key=part.key)
 
-    read = list(problems_or_faults_of(chunk.problem_slice, assistant.vehicle))
+    read = list(problems_or_faults_of(part.problem_slice, assistant.vehicle))
     problems = [problem for _, problem in read if not isinstance(problem, str)]
     if len(problems) < len(read):
         return PartResult([f"{place}: {fault}" for place, fault in read if isinstance(fault, str)])
-    with no_garbage_collection(), _kept_if_interrupted(lambda: keep(chunk.begun)):
+    with no_garbage_collection(), _kept_if_interrupted(lambda: keep(part.begun)):
         kept = time.monotonic()
         for number, problem in enumerate(problems):
             if number < before:
@@ -174,19 +174,19 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 solved.append(Solved(to_canonical(problem)[0], attempt))
             if request.plans is not None:
                 write_plan(
-                    plan_path(chunk, problem.id, number),
+                    plan_path(part, problem.id, number),
                     assistant.record(problem, attempt, plan),
                 )
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
             on_problem()
             if time.monotonic() - kept > KEEP_SECONDS:
-                keep(chunk.begun)
+                keep(part.begun)
                 kept = time.monotonic()
             if len(rows) % COLLECT_EVERY == 0:
                 gc.collect()
-    keep(chunk.shard)
-    chunk.begun.unlink(missing_ok=True)
+    keep(part.shard)
+    part.begun.unlink(missing_ok=True)
     return PartResult([], learned, unlearned)
 
 
