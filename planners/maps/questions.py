@@ -13,7 +13,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix, point_is
 from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate, turn_limit
-from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, FIRST_HITCH, Vehicle, state_size
 
 DISTANCES_M: Final = (2.0, 70.0)  # from start to goal
 STEERED: Final = 0.5  # share of the largest steering angle or turn rate, at most, at the start
@@ -71,7 +71,7 @@ def _started(world: Problem, rng: np.random.Generator, vehicle: Vehicle) -> Prob
     low, high = np.array(world.bounds).reshape(2, 2)
     (x, y), heading = rng.uniform(low, high).tolist(), rng.uniform(-math.pi, math.pi)
     turn = STEERED * turn_limit(vehicle) * rng.uniform(-1.0, 1.0)
-    bent = [BENT * rng.uniform(-1.0, 1.0) for _ in range(state_size(vehicle) - 5)]
+    bent = [BENT * rng.uniform(-1.0, 1.0) for _ in range(state_size(vehicle) - FIRST_HITCH)]
     speed = rng.uniform(max(vehicle.min_speed, 0.0), vehicle.max_speed)
     return replace(world, start=(x, y, heading), start_motion=(speed, turn, *bent))
 

@@ -28,7 +28,7 @@ from planners.world.vehicles.dynamics import (
     top_speed,
     turn_in,
 )
-from planners.world.vehicles.vehicle import Vehicle, state_size
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle, state_size
 
 STANDS: Final = 1e-6  # metres of a step: less is no drive
 GENTLE: Final = 0.95  # of all limits: the rest is left for closing gaps
@@ -81,9 +81,9 @@ def _runs(plan: Plan, bends: Floats, factor: float, size: int) -> list[Run]:
         if len(part) == 0:
             continue
         rows = np.concatenate((part[:1], part + 1))
-        hitches = np.zeros((2, size - 5))
-        both = min(hitches.shape[1], states.shape[1] - 5)
-        hitches[:, :both] = states[rows[[0, -1]], 5 : 5 + both]
+        hitches = np.zeros((2, size - FIRST_HITCH))
+        both = min(hitches.shape[1], states.shape[1] - FIRST_HITCH)
+        hitches[:, :both] = states[rows[[0, -1]], FIRST_HITCH : FIRST_HITCH + both]
         runs.append(
             Run(
                 float(gears[part[0]]),
@@ -136,7 +136,7 @@ def _driven(run: Run, vehicle: Vehicle, begin: float, end: float) -> Floats:
     times = np.concatenate(([0.0], np.cumsum(ways / paces)))
     steps = max(math.ceil(times[-1] / vehicle.dt), 1)
     at = np.linspace(0.0, times[-1], steps + 1)
-    states = np.empty((steps + 1, 5 + run.hitches.shape[1]))
+    states = np.empty((steps + 1, FIRST_HITCH + run.hitches.shape[1]))
     for c in range(3):
         states[:, c] = np.interp(at, times, run.poses[:, c])
     states[:, 3] = run.gear * np.interp(at, times, tops)
@@ -148,16 +148,16 @@ def _driven(run: Run, vehicle: Vehicle, begin: float, end: float) -> Floats:
 def _pull_trailers(states: Floats, run: Run, vehicle: Vehicle) -> None:
     """Fill in the hitches: forwards from the beginning, and backwards from the end, as if time ran back."""
     size = states.shape[1]
-    if size == 5:
+    if size == FIRST_HITCH:
         return
     if run.gear > 0.0:
-        states[0, 5:] = run.hitches[0]
+        states[0, FIRST_HITCH:] = run.hitches[0]
         _pull(states, vehicle)
         return
     back = states[::-1] * np.where(np.arange(size) == 3, -1.0, 1.0)
-    back[0, 5:] = run.hitches[1]
+    back[0, FIRST_HITCH:] = run.hitches[1]
     _pull(back, vehicle)
-    states[:, 5:] = back[::-1, 5:]
+    states[:, FIRST_HITCH:] = back[::-1, FIRST_HITCH:]
 
 
 @lean
@@ -166,7 +166,7 @@ def _pull(states: Floats, vehicle: Vehicle) -> None:
         first = (states[k + 1, 3] - states[k, 3]) / vehicle.dt
         second = (states[k + 1, 4] - states[k, 4]) / vehicle.dt
         after = step(load(states, k, vehicle), first, second, vehicle)
-        for h in range(5, states.shape[1]):
+        for h in range(FIRST_HITCH, states.shape[1]):
             states[k + 1, h] = after[h]
 
 

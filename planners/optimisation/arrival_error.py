@@ -20,6 +20,7 @@ from planners.world.goal import (
 )
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length, wrapped
+from planners.world.vehicles.vehicle import FIRST_HITCH
 
 OFF: Final = 0.25  # metres; what it costs to be off the aim by the usual share of what is tolerated
 USUAL: Final = 0.5  # share of what is tolerated by which the aim lies inside of it
@@ -56,8 +57,8 @@ def aim_near(end: Floats, goal: Floats, aim: Floats, inside: float) -> None:
     aim[4] = min(max(end[4], -goal[MOST_TURN]), goal[MOST_TURN])
     for k in range((goal.shape[0] - HITCHES) // 2):
         most = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1], inside)
-        off = end[5 + k] - goal[HITCHES + 2 * k]
-        aim[5 + k] = goal[HITCHES + 2 * k] + min(max(off, -most), most)
+        off = end[FIRST_HITCH + k] - goal[HITCHES + 2 * k]
+        aim[FIRST_HITCH + k] = goal[HITCHES + 2 * k] + min(max(off, -most), most)
 
 
 @lean
@@ -76,7 +77,7 @@ def error_cost(states: Floats, i: int, aim: Floats, goal: Floats) -> float:
         off = wrapped(states[i, 2] - aim[2])
         cost += 0.5 * bend_of_error(goal[HEADING_TOLERANCE]) * off * off
     for k in range((goal.shape[0] - HITCHES) // 2):
-        off = states[i, 5 + k] - aim[5 + k]
+        off = states[i, FIRST_HITCH + k] - aim[FIRST_HITCH + k]
         cost += 0.5 * bend_of_error(goal[HITCHES + 2 * k + 1]) * off * off
     return float(cost)
 
@@ -94,5 +95,5 @@ def pull_to_aim(model: Model, steps: int, goal: Floats) -> None:
         curvature[2, 2] += bend_of_error(goal[HEADING_TOLERANCE])
     for k in range((goal.shape[0] - HITCHES) // 2):
         bend = bend_of_error(goal[HITCHES + 2 * k + 1])
-        gradient[5 + k] += bend * (last[5 + k] - aim[5 + k])
-        curvature[5 + k, 5 + k] += bend
+        gradient[FIRST_HITCH + k] += bend * (last[FIRST_HITCH + k] - aim[FIRST_HITCH + k])
+        curvature[FIRST_HITCH + k, FIRST_HITCH + k] += bend

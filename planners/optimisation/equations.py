@@ -13,7 +13,7 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.vehicles.interface import SPARE
-from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import FIRST_HITCH, DifferentialDrive, Vehicle, state_size, trailers_of
 
 SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
 SHY_OF_JACK_KNIFE = 1e-3  # rad: the solver may pass a limit by its tolerance
@@ -36,9 +36,9 @@ def slopes(state: ca.SX, controls: ca.SX, vehicle: Vehicle) -> ca.SX:
     hitches = []
     pull = speed
     for i, trailer in enumerate(trailers_of(vehicle)):
-        turning.append(pull * ca.sin(state[5 + i]) / trailer.hitch_length)
+        turning.append(pull * ca.sin(state[FIRST_HITCH + i]) / trailer.hitch_length)
         hitches.append(turning[i] - turning[i + 1])
-        pull *= ca.cos(state[5 + i])
+        pull *= ca.cos(state[FIRST_HITCH + i])
     return ca.vertcat(
         speed * ca.cos(heading), speed * ca.sin(heading), turning[0], controls[0], controls[1], *hitches
     )
@@ -52,7 +52,7 @@ def step_of(vehicle: Vehicle) -> ca.Function:
     state, controls, h = ca.SX.sym("state", state_size(vehicle)), ca.SX.sym("controls", 2), ca.SX.sym("h")
     begin, rates = state, controls
     if vehicle.first_order:  # speed and steering change at once
-        begin = ca.vertcat(state[:3], state[3:5] + h * controls, state[5:])
+        begin = ca.vertcat(state[:3], state[3:5] + h * controls, state[FIRST_HITCH:])
         rates = ca.SX.zeros(2)
     return ca.Function("step", [state, controls, h], [_moved(begin, rates, h, vehicle)])
 
@@ -112,7 +112,7 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     body = (vehicle.front, vehicle.rear, vehicle.width)
     rows = [_row(x, y, heading, body, speed, turn, vehicle.dt, a_body)]
     for i, trailer in enumerate(trailers_of(vehicle)):
-        hitch, length = state[5 + i], trailer.hitch_length
+        hitch, length = state[FIRST_HITCH + i], trailer.hitch_length
         heading -= hitch
         x -= length * ca.cos(heading)
         y -= length * ca.sin(heading)

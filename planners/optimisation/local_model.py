@@ -14,7 +14,7 @@ from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import lateral_acceleration, load, numbers_of, swept_bodies
 from planners.world.vehicles.slopes import differentiate_step
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 NEVER: Final = 1 << 30  # steps, of a drive that there is not
 NUDGE: Final = 1e-6  # of a number of a state, for derivatives of boxes by differences
@@ -97,7 +97,7 @@ def nearness_cost(
             if dx * dx + dy * dy < near * near:
                 gap, _ = widest_gap(box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far)
                 cost += nearness(gap - barrier.margin_m, barrier)[0]
-    for h in range(5, numbers_of(states, vehicle)):
+    for h in range(FIRST_HITCH, numbers_of(states, vehicle)):
         cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH)[0]
     most = vehicle.max_lateral_acceleration
     if most < math.inf:
@@ -149,7 +149,7 @@ def differentiate_nearness(
                     _differentiate_boxes(model, i, vehicle)
                     is_near = True
                 cost += _add_gap(model, i, body, box, axis, gap, barrier, vehicle)
-    for h in range(5, size):
+    for h in range(FIRST_HITCH, size):
         hitch = states[i, h]
         value, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
         cost += value

@@ -29,7 +29,7 @@ from planners.optimisation.equations import (
 from planners.world.arrays import Floats
 from planners.world.goal import must_not_turn
 from planners.world.problem import Arrival, Plan, Problem, start_state
-from planners.world.vehicles.vehicle import Vehicle, state_size
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle, state_size
 
 GOAL_SHY_M = 1e-3  # how far inside the goal disc to end, since simulated states are some 1e-7 m off
 GOAL_SHY = 0.95  # the share of tolerated angles that is used, for the same reason
@@ -144,8 +144,8 @@ def transcribe(
     if must_not_turn(arrival, vehicle):
         last_low[4] = last_high[4] = 0.0
     for k, (hitch, tolerance) in enumerate(zip(arrival.hitches, arrival.hitch_tolerances, strict=True)):
-        last_low[5 + k] = max(last_low[5 + k], hitch - GOAL_SHY * tolerance)
-        last_high[5 + k] = min(last_high[5 + k], hitch + GOAL_SHY * tolerance)
+        last_low[FIRST_HITCH + k] = max(last_low[FIRST_HITCH + k], hitch - GOAL_SHY * tolerance)
+        last_high[FIRST_HITCH + k] = min(last_high[FIRST_HITCH + k], hitch + GOAL_SHY * tolerance)
     reach = max(problem.goal_radius - GOAL_SHY_M, 0.0)
     aligned = [math.cos(min(GOAL_SHY * arrival.heading_tolerance, math.pi))] * len(facing)
     dynamics, clear = np.zeros(size * steps), np.full(gaps.numel(), margin_m)

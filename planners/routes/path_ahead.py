@@ -13,6 +13,7 @@ from planners.world.arrays import Flags, Floats, Point
 from planners.world.geometry.collision import Scene, point_is_free
 from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival
 from planners.world.trigonometry import all_wrapped
+from planners.world.vehicles.vehicle import FIRST_HITCH
 
 REACHES_M: Final = (60.0, 35.0, 20.0, 10.0)  # along the path to the local goals, in the order of trial
 SOUGHT_M: Final = 10.0  # before the end of a reach: so far back a place with more room is looked for
@@ -140,7 +141,7 @@ class PathAhead:
             off = np.abs(all_wrapped(states[:, 2] - asked.heading))
             there = there & (off <= asked.heading_tolerance)
         for i, (hitch, tolerance) in enumerate(zip(asked.hitches, asked.hitch_tolerances, strict=True)):
-            there = there & (np.abs(states[:, 5 + i] - hitch) <= tolerance)
+            there = there & (np.abs(states[:, FIRST_HITCH + i] - hitch) <= tolerance)
         return there
 
     def local_goals(self, pose: Floats) -> list[LocalGoal]:

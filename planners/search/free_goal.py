@@ -18,7 +18,7 @@ from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, note_free
 from planners.world.problem import Problem, counter_clockwise
 from planners.world.vehicles.dynamics import control_limits
-from planners.world.vehicles.vehicle import Trailer, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import FIRST_HITCH, Trailer, Vehicle, state_size, trailers_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
@@ -170,7 +170,7 @@ def unfolded(problem: Problem, vehicle: Vehicle) -> Floats | None:
         return None
     last = np.zeros(state_size(vehicle))
     last[:4] = *problem.goal, arrival.heading, min(max(0.0, arrival.least_speed), arrival.most_speed)
-    last[5 : 5 + len(arrival.hitches)] = arrival.hitches
+    last[FIRST_HITCH : FIRST_HITCH + len(arrival.hitches)] = arrival.hitches
     return last
 
 

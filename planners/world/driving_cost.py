@@ -34,11 +34,17 @@ def pays(vehicle: Vehicle) -> bool:
 
 
 @inlined
+def gear_of(metres: float) -> float:
+    """The gear (1 or -1) of what is driven: of metres, or a speed (m/s), negative backwards."""
+    return 1.0 if metres > 0.0 else -1.0
+
+
+@inlined
 def gear_after(gear: float, speed: float) -> float:
     """The gear (1 or -1) after a step that ends at this speed (m/s): the one before if it stands then."""
     if abs(speed) < STANDING:
         return gear
-    return 1.0 if speed > 0.0 else -1.0
+    return gear_of(speed)
 
 
 @inlined

@@ -12,7 +12,7 @@ from planners.world.jit import inlined
 from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem
 from planners.world.trigonometry import length, wrapped
 from planners.world.vehicles.dynamics import State
-from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, DifferentialDrive, Vehicle
 
 # of a goal [8 + 2 n]; then follow angle and tolerance (radians) of each hitch that counts
 X, Y, RADIUS, HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, MOST_TURN, HITCHES = range(9)
@@ -65,7 +65,7 @@ def reaches(state: State, goal: Floats) -> bool:
     if abs(wrapped(state[2] - goal[HEADING])) > goal[HEADING_TOLERANCE]:
         return False
     for k in range((goal.shape[0] - HITCHES) // 2):
-        if abs(state[5 + k] - goal[HITCHES + 2 * k]) > goal[HITCHES + 2 * k + 1]:
+        if abs(state[FIRST_HITCH + k] - goal[HITCHES + 2 * k]) > goal[HITCHES + 2 * k + 1]:
             return False
     return True
 

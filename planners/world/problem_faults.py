@@ -108,7 +108,7 @@ def arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> st
     low, high = _limits("speed", vehicle)
     if arrival.least_speed > high or arrival.most_speed < low:
         return f"{asked} is beyond the vehicle, which drives {scale * low:g} to {scale * high:g} m/s"
-    trailers = len(state_names(vehicle)) - 5
+    trailers = len(trailers_of(vehicle))
     angles, tolerances = len(arrival.hitches), len(arrival.hitch_tolerances)
     if (angles, tolerances) not in ((0, 0), (trailers, trailers)):
         wanted = f"{trailers} of each, or none" if trailers else "none, as there are no trailers"

@@ -22,7 +22,7 @@ from planners.world.jit import inlined, jit
 from planners.world.problem import Plan
 from planners.world.trigonometry import length, sincos, wrapped
 from planners.world.vehicles.dynamics import load
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
@@ -97,7 +97,7 @@ def _begin_off(first: Floats, side: float, seen: Floats, off: Floats) -> float:
     off[1] = seen[1] - side * first[1]
     off[2] = wrapped(seen[2] - side * first[2])
     far = float(abs(off[2]))
-    for k in range(5, first.shape[0]):
+    for k in range(FIRST_HITCH, first.shape[0]):
         off[k] = seen[k] - side * first[k]
         far += abs(off[k])
     return far
@@ -115,7 +115,7 @@ def _move(drives: Drives, i: int, side: float, goal: Floats, off: Floats, moved:
     moved[row, 2] = goal[HEADING] + side * state[2] + share * off[2]
     moved[row, 3] = state[3]
     moved[row, 4] = side * state[4]
-    for k in range(5, state.shape[0]):
+    for k in range(FIRST_HITCH, state.shape[0]):
         moved[row, k] = side * state[k] + share * off[k]
 
 

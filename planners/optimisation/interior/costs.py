@@ -16,7 +16,7 @@ from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SP
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import load, numbers_of, step, turn_limit
 from planners.world.vehicles.slopes import differentiate_step
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 # metres; what it costs to be full speed off the speed that is asked at the end, or to turn at full rate where
 # none is asked. A little speed is always left that is worth the braking that it saves; taking it away must
@@ -46,10 +46,10 @@ def weight_of_error(c: int, goal: Floats, hold: Hold, vehicle: Vehicle) -> float
     elif c == 4:
         most = turn_limit(vehicle)
         return 2.0 * MOTION_OFF / (most * most) if goal[MOST_TURN] < math.inf else 0.0
-    elif c - 5 >= (goal.shape[0] - HITCHES) // 2:
+    elif c - FIRST_HITCH >= (goal.shape[0] - HITCHES) // 2:
         return 0.0
     else:
-        return hold.pull * bend_of_error(goal[HITCHES + 2 * (c - 5) + 1])
+        return hold.pull * bend_of_error(goal[HITCHES + 2 * (c - FIRST_HITCH) + 1])
 
 
 @lean

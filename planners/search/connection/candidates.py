@@ -19,7 +19,7 @@ from planners.search.connection.dubins import list_forward_words
 from planners.search.connection.profile import run_seconds
 from planners.search.connection.words import PARTS, list_words
 from planners.world.arrays import Floats, Pose
-from planners.world.driving_cost import cost_of_second, extra_cost
+from planners.world.driving_cost import cost_of_second, extra_cost, gear_of
 from planners.world.goal import X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos, wrapped
@@ -50,7 +50,7 @@ def word_seconds(
         k += 1
     first = True
     while k < PARTS:
-        gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
+        gear = gear_of(word[PARTS + k])
         metres = 0.0
         bent = 0.0
         while k < PARTS and gear * word[PARTS + k] >= 0.0:

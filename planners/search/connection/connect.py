@@ -22,6 +22,7 @@ from planners.search.connection.connection import (
 from planners.search.connection.profile import fill_limited, fill_run
 from planners.search.connection.words import PARTS
 from planners.world.arrays import Floats
+from planners.world.driving_cost import gear_of
 from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, X, Y, reaches
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length, sincos, wrapped
@@ -72,7 +73,7 @@ def _take(c: Connection, number: int, top: float, vehicle: Vehicle) -> int:
     for k in range(PARTS):
         metres = radius * c.words[number, PARTS + k]
         if metres != 0.0:
-            gear = 1.0 if metres > 0.0 else -1.0
+            gear = gear_of(metres)
             metres = abs(metres)
             share = 1.0
             if c.words[number, k] != 0.0 and (count > 0 or speed == 0.0):

@@ -10,7 +10,7 @@ from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, step, store, top_speed, trailing, turn_in
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
 LEAST: Final = 0.001  # of it: the stride of a vehicle that hardly moves in a step
@@ -40,7 +40,7 @@ def stride_of(gear: float, vehicle: Vehicle) -> float:
 @inlined
 def at_pace(state: State, speed: float, bend: float, vehicle: Vehicle) -> State:
     """The same pose, with a speed (m/s) and a bend."""
-    return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle), *state[5:])
+    return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle), *state[FIRST_HITCH:])
 
 
 class Stride(NamedTuple):
@@ -74,7 +74,7 @@ def leapt(state: State, leap: Leap, vehicle: Vehicle) -> State:
     x = state[0] + cos * leap[0] - sin * leap[1]
     y = state[1] + sin * leap[0] + cos * leap[1]
     speed = min(max(leap[3], vehicle.min_speed), vehicle.max_speed)
-    after = (x, y, state[2] + leap[2], speed, leap[4], *state[5:])
+    after = (x, y, state[2] + leap[2], speed, leap[4], *state[FIRST_HITCH:])
     return trailing(after, leap[3], leap[2] / vehicle.dt, vehicle)
 
 

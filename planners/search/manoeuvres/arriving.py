@@ -16,7 +16,7 @@ from planners.search.manoeuvres.pose_tree import PoseTree, list_links
 from planners.search.query import Endings
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
-from planners.world.driving_cost import extra_along
+from planners.world.driving_cost import extra_along, gear_of
 from planners.world.geometry.collision import Scene
 from planners.world.goal import reaches
 from planners.world.jit import lean
@@ -65,7 +65,7 @@ def _drive_out(drive: Drive, before: PoseTree, last: int, vehicle: Vehicle, scen
             and before.metres[chain[k + 1]] * metres > 0.0
         ):
             continue  # the next arc goes on
-        gear = 1.0 if metres > 0.0 else -1.0
+        gear = gear_of(metres)
         if not drive_arc(drive, gear, before.bends[link], abs(metres), vehicle, scene):
             return False
         metres = 0.0
@@ -92,7 +92,7 @@ def drive_arcs_to_goal(
     begin(drive, before.states)
     for k in range(links):
         link = drive.join.chain[k]
-        gear = 1.0 if before.metres[link] > 0.0 else -1.0
+        gear = gear_of(before.metres[link])
         if not drive_arc(drive, gear, before.bends[link], abs(before.metres[link]), vehicle, scene):
             return False
     arcs = drive.join.arcs
@@ -135,7 +135,7 @@ def _drive_in(
             drive.counts[2] += 1
             node = tree.parents[node]
             continue
-        gear = 1.0 if tree.metres[node] < 0.0 else -1.0
+        gear = gear_of(-tree.metres[node])
         bend = tree.bends[node]
         metres = abs(tree.metres[node])
         node = tree.parents[node]

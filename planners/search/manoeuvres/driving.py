@@ -16,7 +16,7 @@ from planners.search.manoeuvres.near_meetings import NearMeetings, allocate_near
 from planners.search.manoeuvres.pace import fill_pace
 from planners.search.manoeuvres.ways import Ways, allocate_ways
 from planners.world.arrays import Floats, Indices
-from planners.world.driving_cost import cost_of
+from planners.world.driving_cost import cost_of, gear_of
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import SLACK
 from planners.world.jit import inlined, lean
@@ -266,7 +266,7 @@ def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
     for k in range(PARTS):
         metres = radius * c.words[word, PARTS + k]
         if abs(metres) > SMALLEST:
-            gear = 1.0 if metres > 0.0 else -1.0
+            gear = gear_of(metres)
             if not drive_arc(drive, gear, bend * c.words[word, k], abs(metres), vehicle, scene):
                 return False
     return True

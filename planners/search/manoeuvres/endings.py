@@ -16,7 +16,7 @@ from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load
-from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import Vehicle, length_of_trailers, state_size
 
 FARTHEST: Final = 4.0  # from the goal, in the length of vehicle and trailers: where an ending begins
 
@@ -26,7 +26,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
 
     Each is given as its ``states [T, S]`` and ``controls [T - 1, 2]``. Without a stop at the end: left out.
     """
-    size = vehicle.front + vehicle.rear + sum(each.hitch_length for each in trailers_of(vehicle))
+    size = vehicle.front + vehicle.rear + length_of_trailers(vehicle)
     states, controls, starts, follows = [], [], [0], []
     for drive, steering in plans:
         stands = np.abs(drive[:, 3]) < STANDING

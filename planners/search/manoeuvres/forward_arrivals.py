@@ -28,7 +28,13 @@ from planners.world.driving_cost import cost_of, gears_of
 from planners.world.geometry.collision import count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Plan
-from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import (
+    FIRST_HITCH,
+    Vehicle,
+    length_of_trailers,
+    state_size,
+    trailers_of,
+)
 
 AT_LAST: Final = 0.25  # lengths of all trailers at the end of a drive: if they lead backwards, it backs in
 APART: Final = 1.0  # lengths of all trailers between states from which loops are laid
@@ -59,8 +65,8 @@ def arrive_forwards(query: Query, plan: Plan, until: float, below_s: float = mat
         return None
     end = pose_of(goal, state_size(vehicle))
     before = end.copy()
-    before[5:] = 0.0
-    before[:2] -= RUN_IN * _train(vehicle) * np.array([math.cos(end[2]), math.sin(end[2])])
+    before[FIRST_HITCH:] = 0.0
+    before[:2] -= RUN_IN * length_of_trailers(vehicle) * np.array([math.cos(end[2]), math.sin(end[2])])
     if count_free_prefix(before[np.newaxis], vehicle, query.scene) == 0:
         return None
     cost = min(cost_of(plan, vehicle), below_s)
@@ -74,15 +80,10 @@ def arrive_forwards(query: Query, plan: Plan, until: float, below_s: float = mat
     return better if cost_of(better, vehicle) < cost else None
 
 
-def _train(vehicle: Vehicle) -> float:
-    """The length of all trailers, in metres."""
-    return sum(each.hitch_length for each in trailers_of(vehicle))
-
-
 def _backs_in(plan: Plan, vehicle: Vehicle) -> bool:
     """Whether a drive ends backwards, but maybe for a last correction."""
     metres = np.hypot(*np.diff(plan.states[:, :2], axis=0).T)
-    at_last = metres[::-1].cumsum()[::-1] <= AT_LAST * _train(vehicle)
+    at_last = metres[::-1].cumsum()[::-1] <= AT_LAST * length_of_trailers(vehicle)
     return bool((gears_of(plan, vehicle) * metres)[at_last].sum() < 0.0)
 
 
@@ -92,7 +93,7 @@ def _promising(
     """Ways ``[T, S]`` into ``end [S]`` of different kinds, each expected to cost less than ``below``."""
     vehicle = query.vehicle
     loops = query.workspace.buffers(allocate_loops)
-    around = word_radius(vehicle), _train(vehicle), vehicle
+    around = word_radius(vehicle), length_of_trailers(vehicle), vehicle
     found: list[tuple[float, float, Floats, tuple[float, ...]]] = []
     for begins in _beginnings(plan, end, vehicle):
         if working_clock() >= until:
@@ -119,7 +120,7 @@ def _promising(
 
 def _beginnings(plan: Plan, end: Floats, vehicle: Vehicle) -> list[int]:
     """Numbers of states of a drive, some way apart, from which loops may lead to its end."""
-    train = _train(vehicle)
+    train = length_of_trailers(vehicle)
     along = np.cumsum(np.hypot(*np.diff(plan.states[:, :2], axis=0).T))
     _, firsts = np.unique(np.floor(along / (APART * train)), return_index=True)
     off = np.hypot(*(plan.states[firsts, :2] - end[:2]).T)

@@ -15,6 +15,7 @@ import numpy as np
 from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.arcs import COARSE, leap_of, leapt, stride_along, stride_in, stride_of
 from planners.world.arrays import Floats, Indices
+from planners.world.driving_cost import gear_of
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
@@ -27,7 +28,7 @@ from planners.world.vehicles.dynamics import (
     tightest_bend,
     turning_speed,
 )
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 MOST_ARCS: Final = 2 * PARTS
 MOST_CHAIN: Final = 256
@@ -132,7 +133,7 @@ def _carried_hitch(join: Join, k: int, row: int, after: State, hitches: int) -> 
     """How hitch ``row`` at the meeting changes if arc ``k`` leads to ``after``."""
     total = 0.0
     for j in range(hitches):
-        total += join.carried[0, row, j] * (after[5 + j] - join.ways[k, 5 + j])
+        total += join.carried[0, row, j] * (after[FIRST_HITCH + j] - join.ways[k, FIRST_HITCH + j])
     return total
 
 
@@ -144,7 +145,7 @@ def find_effects(start: Floats, join: Join, vehicle: Vehicle) -> None:
     carried on from arc to arc.
     """
     before, arcs = join.counts[BEFORE], join.counts[ARCS]
-    hitches = numbers_of(start, vehicle) - 5
+    hitches = numbers_of(start, vehicle) - FIRST_HITCH
     for i in range(arcs):
         k = before - 1 - i if i < before else i  # from the meeting on, to either side
         if i in (0, before):
@@ -164,7 +165,7 @@ def find_effects(start: Floats, join: Join, vehicle: Vehicle) -> None:
                 join.effects[row, column] *= sign / NUDGE
         for j in range(hitches):
             store(join.bent, 0, begin)
-            join.bent[0, 5 + j] += NUDGE
+            join.bent[0, FIRST_HITCH + j] += NUDGE
             after = _led(load(join.bent, 0, vehicle), join, k, 0.0, 0.0, vehicle)
             for row in range(hitches):
                 join.carried[1, row, j] = _carried_hitch(join, k, row, after, hitches) / NUDGE
@@ -269,7 +270,7 @@ def take_word(join: Join, word: Floats, radius: float, vehicle: Vehicle) -> None
     for k in range(PARTS):
         metres = radius * word[PARTS + k]
         if metres != 0.0:
-            arcs[0, count] = 1.0 if metres > 0.0 else -1.0
+            arcs[0, count] = gear_of(metres)
             arcs[1, count] = bend * word[k]
             arcs[2, count] = abs(metres)
             count += 1

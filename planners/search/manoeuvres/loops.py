@@ -22,6 +22,7 @@ from planners.search.manoeuvres.ways import take_arcs
 from planners.search.query import Query
 from planners.world.arrays import Floats, Pose
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import gear_of
 from planners.world.geometry.collision import Scene, bodies_are_free, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
@@ -34,7 +35,7 @@ from planners.world.vehicles.dynamics import (
     tightest_bend,
     turning_speed,
 )
-from planners.world.vehicles.vehicle import Vehicle, trailers_of
+from planners.world.vehicles.vehicle import Vehicle, length_of_trailers
 
 NEAR_BY: Final = 1.5  # lengths of the whole train: if the goal is farther away, the way there turns anyway
 # lengths are in those of all trailers
@@ -89,7 +90,7 @@ def _looks(metres: float, vehicle: Vehicle) -> int:
     """How many looks an arc is worth."""
     if metres == 0.0:
         return 0
-    return math.ceil(abs(metres) / (COARSE * stride_of(1.0 if metres > 0.0 else -1.0, vehicle)))
+    return math.ceil(abs(metres) / (COARSE * stride_of(gear_of(metres), vehicle)))
 
 
 @lean
@@ -190,7 +191,7 @@ def lay_loop(way: Floats, loops: Loops, number: int, start: Floats, vehicle: Veh
         metres = loops.metres[number, k]
         if metres == 0.0:
             continue
-        gear = 1.0 if metres > 0.0 else -1.0
+        gear = gear_of(metres)
         at = lay_arc(way, at, state, gear, loops.bends[number, k], abs(metres), 0.0, vehicle)
         if at < 0:
             return 0
@@ -217,7 +218,7 @@ def loop(
         vehicle: what is driven.
         until: when to end, by ``working_clock``.
     """
-    train = sum(each.hitch_length for each in trailers_of(vehicle))
+    train = length_of_trailers(vehicle)
     is_far = math.dist(start[0, :2], end[0, :2]) > NEAR_BY * (vehicle.front + vehicle.rear + train)
     if is_far or vehicle.max_speed < -vehicle.min_speed:
         return False

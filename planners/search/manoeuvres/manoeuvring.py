@@ -42,7 +42,7 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING, LEAST_SPEED, MOST_SPEED, SLACK, X, Y
 from planners.world.problem import start_state
-from planners.world.vehicles.vehicle import state_size
+from planners.world.vehicles.vehicle import FIRST_HITCH, state_size
 
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
@@ -94,7 +94,7 @@ class Manoeuvring:
         start = start_state(query.problem, vehicle)[np.newaxis]
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
-        ends = np.abs([start[0, 5:], pose_of(goal, size)[5:]]).max(0)
+        ends = np.abs([start[0, FIRST_HITCH:], pose_of(goal, size)[FIRST_HITCH:]]).max(0)
         self._leaving = less_folded(vehicle, ends)
         self._outgoing = time_reversed(self._leaving)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)

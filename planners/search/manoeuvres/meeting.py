@@ -11,6 +11,7 @@ from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, list_links
 from planners.search.manoeuvres.ways import meeting_is_worth
 from planners.search.query import Endings
 from planners.world.arrays import Floats
+from planners.world.driving_cost import gear_of
 from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
 from planners.world.vehicles.vehicle import Vehicle
@@ -59,12 +60,12 @@ def meet(
     join.counts[ARCS] = join.counts[BEFORE] = links - straight
     for k in range(links - straight):
         each = join.chain[straight + k]
-        join.arcs[0, k] = 1.0 if before.metres[each] > 0.0 else -1.0
+        join.arcs[0, k] = gear_of(before.metres[each])
         join.arcs[1, k] = before.bends[each]
         join.arcs[2, k] = abs(before.metres[each])
     while join.counts[ARCS] < links - straight + BENT and node > 0 and tree.known[node] < 0:
         k = join.counts[ARCS]
-        join.arcs[0, k] = 1.0 if tree.metres[node] < 0.0 else -1.0
+        join.arcs[0, k] = gear_of(-tree.metres[node])
         join.arcs[1, k] = tree.bends[node]
         join.arcs[2, k] = abs(tree.metres[node])
         join.counts[ARCS] += 1

@@ -15,9 +15,10 @@ import numpy as np
 from planners.search.manoeuvres.arcs import lay_arc
 from planners.search.manoeuvres.pose_tree import PLACE, PoseTree, list_links
 from planners.world.arrays import Floats, Indices
+from planners.world.driving_cost import gear_of
 from planners.world.jit import lean
 from planners.world.vehicles.dynamics import load, store
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 MOST: Final = 64  # of them are remembered, by a search that mends
 APART: Final = PLACE  # lengths of the first body: of those that are nearer to each other one is
@@ -57,7 +58,7 @@ def note_near(
     here = load(before.states, last, vehicle)
     there = load(tree.states, node, vehicle)
     off = 0.0
-    for k in range(5, len(here)):
+    for k in range(FIRST_HITCH, len(here)):
         off += abs(here[k] - there[k])
     apart = APART * (vehicle.front + vehicle.rear)
     at = -1
@@ -104,7 +105,7 @@ def lay_way(
     for k in range(links):
         link = chain[k]
         state = load(before.states, before.parents[link], vehicle)
-        gear = 1.0 if before.metres[link] > 0.0 else -1.0
+        gear = gear_of(before.metres[link])
         at = lay_arc(way, at, state, gear, before.bends[link], abs(before.metres[link]), 0.0, vehicle)
         if at < 0:
             return 0
@@ -114,7 +115,7 @@ def lay_way(
         turn = 2.0 * math.pi * math.floor(off + 0.5)
     while node > 0:
         state = load(tree.states, node, vehicle)
-        gear = 1.0 if tree.metres[node] < 0.0 else -1.0
+        gear = gear_of(-tree.metres[node])
         at = lay_arc(way, at, state, gear, tree.bends[node], abs(tree.metres[node]), turn, vehicle)
         if at < 0:
             return 0

@@ -36,7 +36,7 @@ from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load, tightest_bend, turning_speed
-from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, CarWithTrailers, Vehicle
 
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
@@ -87,7 +87,7 @@ def _last_body(state: State, vehicle: CarWithTrailers) -> Pose:
     """The pose of the last trailer."""
     x, y, heading = state[0], state[1], state[2]
     for k in range(len(vehicle.trailers)):
-        heading -= state[5 + k]
+        heading -= state[FIRST_HITCH + k]
         sin, cos = sincos(heading)
         x -= vehicle.trailers[k].hitch_length * cos
         y -= vehicle.trailers[k].hitch_length * sin
@@ -112,7 +112,7 @@ def _least_seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) 
 @inlined
 def _seconds_from_start(state: State, known: FromStart, settings: Outward, vehicle: Vehicle) -> float:
     turns = _least_seconds_from_start(state, known, vehicle)
-    if len(state) > 5:  # decided when compiling
+    if len(state) > FIRST_HITCH:  # decided when compiling
         root = load(known.start, 0, vehicle)
         there, here = _last_body(root, vehicle), _last_body(state, vehicle)  # type: ignore[arg-type]  # the state of a car is shorter
         last = _seconds_of_body(there, here, known, vehicle)
@@ -233,7 +233,7 @@ def _wait(
     left = _seconds_from_start(state, known, settings, vehicle)
     estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds, extra)
-    if len(state) > 5:  # decided when compiling
+    if len(state) > FIRST_HITCH:  # decided when compiling
         mark_place(tree, new, known.origin, vehicle)
         near = node_near(other, state, known.origin, vehicle)
         if near >= 0:
@@ -280,7 +280,7 @@ def grow_outward(
         expansions += 1
         tree.counts[LAST] = node
         tree.opened[region] += 1
-        if len(state) > 5:  # decided when compiling
+        if len(state) > FIRST_HITCH:  # decided when compiling
             near = node_near(other, state, known.origin, vehicle)
             if near >= 0:
                 last, first = (near, node) if known.outward else (node, near)

@@ -23,7 +23,7 @@ from planners.world.vehicles.dynamics import (
     top_speed,
     turn_limit,
 )
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 NODES: Final = 1 << 17
 PLACES: Final = 1 << 16
@@ -82,7 +82,7 @@ def pose_of(goal: Floats, size: int) -> Floats:
     """The state ``[size]`` that a goal, that of ``goal_of``, asks for; what it does not ask for is zero."""
     state = np.zeros(size)
     state[[0, 1, 2]] = goal[[X, Y, HEADING]]
-    state[5:] = goal[HITCHES::2] if len(goal) > HITCHES else 0.0
+    state[FIRST_HITCH:] = goal[HITCHES::2] if len(goal) > HITCHES else 0.0
     return state
 
 
@@ -200,7 +200,7 @@ def cell_of(state: State, gear: float, tree: PoseTree, cell: float, headings: in
     column = math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF
     heading = int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi))) % MOST_HEADINGS
     key = 0
-    for k in range(5, len(state)):
+    for k in range(FIRST_HITCH, len(state)):
         key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
     return int(((key << 16 | row) << 16 | column) << 11 | heading << 1 | (1 if gear > 0.0 else 0))
 
@@ -212,7 +212,7 @@ def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
     key = math.floor((state[1] - origin[1]) / cell) & 0xFFFF
     key = key << 16 | (math.floor((state[0] - origin[0]) / cell) & 0xFFFF)
     key = key << 7 | int((wrapped(state[2]) + math.pi) * (PLACE_HEADINGS / (2.0 * math.pi)))
-    for k in range(5, len(state)):
+    for k in range(FIRST_HITCH, len(state)):
         key = key << 5 | (math.floor(state[k] * PLACE_HITCHES) & 31)
     return int(key)
 
@@ -224,7 +224,7 @@ def region_of(state: State, tree: PoseTree, vehicle: Vehicle) -> int:
     key = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
     key = key << 16 | (math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF)
     key = key << 4 | int((wrapped(state[2]) + math.pi) * (REGION_HEADINGS / (2.0 * math.pi)))
-    for k in range(5, len(state)):
+    for k in range(FIRST_HITCH, len(state)):
         key = key << 3 | (math.floor(state[k] + 0.5) & 7)
     return int((key * _FIBONACCI >> 20) & (REGIONS - 1))
 

@@ -23,6 +23,7 @@ from planners.search.manoeuvres.ways import word_is_worth
 from planners.search.query import Endings
 from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
+from planners.world.driving_cost import gear_of
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import load, tightest_bend, turning_speed
@@ -62,7 +63,7 @@ def word_is_free(
         metres = radius * abs(word[PARTS + k])
         if metres == 0.0:
             continue
-        gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
+        gear = gear_of(word[PARTS + k])
         count = math.ceil(metres / stride_of(gear, vehicle))
         stride = stride_in(state, gear, word[k] * bend_limit, metres / count, vehicle)
         for _ in range(count):

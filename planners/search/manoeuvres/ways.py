@@ -13,7 +13,7 @@ import numpy as np
 from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.pose_tree import PoseTree, seconds_of_run
 from planners.world.arrays import Floats, Indices
-from planners.world.driving_cost import cost_of_second
+from planners.world.driving_cost import cost_of_second, gear_of
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
 from planners.world.vehicles.dynamics import top_speed
@@ -65,7 +65,7 @@ def keep_last(ways: Ways) -> int:
 def _add_leg(ways: Ways, metres: float, turn: float) -> None:
     count = ways.counts[0]
     if count < MOST_LEGS and metres != 0.0:
-        ways.legs[count, 0] = 1.0 if metres > 0.0 else -1.0
+        ways.legs[count, 0] = gear_of(metres)
         ways.legs[count, 1] = turn
         ways.counts[0] = count + 1
 
@@ -113,7 +113,7 @@ def _gear_to(tree: PoseTree, node: int) -> float:
     """The gear in which the way to a node of a start tree ends, 0 at its root."""
     if node == 0:
         return 0.0
-    return 1.0 if tree.metres[node] > 0.0 else -1.0
+    return gear_of(tree.metres[node])
 
 
 @inlined
@@ -188,7 +188,7 @@ def word_is_worth(
         if gear * part < 0.0:
             seconds += _run(metres, gear, vehicle) + vehicle.costs.gear_change
             metres = 0.0
-        gear = 1.0 if part > 0.0 else -1.0
+        gear = gear_of(part)
         metres += abs(part)
     seconds += _run(metres, gear, vehicle)
     seconds = _joined_seconds(tree, node, metres, gear, seconds, vehicle)

@@ -10,7 +10,13 @@ import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Point, Pose
 from planners.world.vehicles.bodies import swept_boxes
-from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import (
+    DifferentialDrive,
+    Vehicle,
+    length_of_trailers,
+    state_size,
+    trailers_of,
+)
 
 
 class Sizes(NamedTuple):
@@ -72,7 +78,7 @@ def sizes_of(vehicle: Vehicle) -> Sizes:
         unfolded = trailer.hitch_length / math.sin(min(trailer.max_hitch, 0.5 * math.pi))
         behind = max(unfolded, math.hypot(behind, trailer.hitch_length))
     front = vehicle.front + margins[0]
-    rear = bodies[-1].rear + margins[-1] + sum(each.hitch_length for each in trailers_of(vehicle))
+    rear = bodies[-1].rear + margins[-1] + length_of_trailers(vehicle)
     width = max(body.width + 2.0 * margin for body, margin in zip(bodies, margins, strict=True))
     return Sizes(front + rear, width, front, max(turning, behind))
 

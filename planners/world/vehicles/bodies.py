@@ -7,7 +7,7 @@ import numpy as np
 from planners.world.arrays import Floats
 from planners.world.jit import jit
 from planners.world.vehicles.dynamics import load, swept_bodies
-from planners.world.vehicles.vehicle import CAR, Vehicle, trailers_of
+from planners.world.vehicles.vehicle import CAR, FIRST_HITCH, Vehicle, trailers_of
 
 
 def body_count(vehicle: Vehicle) -> int:
@@ -57,7 +57,7 @@ def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
     bodies = [(states[:, :3], vehicle.front, vehicle.rear, vehicle.width)]
     x, y, heading = states[:, :3].T
     for i, trailer in enumerate(trailers_of(vehicle)):
-        heading = heading - states[:, 5 + i]
+        heading = heading - states[:, FIRST_HITCH + i]
         length = trailer.hitch_length
         x, y = x - length * np.cos(heading), y - length * np.sin(heading)
         pose = np.column_stack((x, y, heading))

@@ -14,7 +14,7 @@ from planners.world.trigonometry import sincos, tan
 from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive, most_motion, swept_motion, turn_rates
 from planners.world.vehicles.interface import State, box_at, half_step_ways, leading_body
-from planners.world.vehicles.vehicle import CarWithTrailers, Trailer
+from planners.world.vehicles.vehicle import FIRST_HITCH, CarWithTrailers, Trailer
 
 Three = tuple[float, float, float]  # a number of each trailer; those of missing ones count for nothing
 
@@ -46,7 +46,7 @@ def _second(trailers: tuple[Trailer, ...]) -> Trailer:
 @inlined
 def _second_hitch(state: State) -> float:
     if len(state) == 6:
-        return state[5]
+        return state[FIRST_HITCH]
     else:
         return state[6]
 
@@ -54,7 +54,7 @@ def _second_hitch(state: State) -> float:
 @inlined
 def hitches_of(state: State) -> Three:
     """The hitch angle of each trailer."""
-    return state[5], _second_hitch(state), state[-1]
+    return state[FIRST_HITCH], _second_hitch(state), state[-1]
 
 
 @inlined
@@ -152,7 +152,7 @@ def _trailing(state: State, speed: float, turn: float, vehicle: CarWithTrailers)
 @implements(interface.is_folded, CarWithTrailers)
 def _is_folded(state: State, vehicle: CarWithTrailers) -> bool:
     trailers = vehicle.trailers
-    room_1 = trailers[0].max_hitch - abs(state[5])
+    room_1 = trailers[0].max_hitch - abs(state[FIRST_HITCH])
     room_2 = _second(trailers).max_hitch - abs(_second_hitch(state))
     room_3 = trailers[-1].max_hitch - abs(state[-1])
     room = min(room_1, room_2, room_3)

@@ -18,7 +18,7 @@ from planners.world.vehicles.car_with_trailers import (
     hitches_of,
 )
 from planners.world.vehicles.dynamics import State, step, turn_rate
-from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import FIRST_HITCH, CarWithTrailers, Vehicle
 
 Instant = tuple[float, float, float, float, float, float, float]  # speed; sine and cosine of each hitch
 
@@ -109,15 +109,15 @@ def _fill_hitch_slopes(
         _instant(speeds[2], after_rates(hitches, h, q)),
     )
     unchanged = (0.0, 0.0, 0.0)
-    trailers = len(state) - 5
+    trailers = len(state) - FIRST_HITCH
     for number in range(4):
         speed_slopes, turn_slopes = slopes[number]
         slope = _hitch_slope(instants, lengths, h, speed_slopes, turn_slopes, unchanged)
         for t in range(trailers):
             if number < 2:
-                by_state[5 + t, 3 + number] = slope[t]
+                by_state[FIRST_HITCH + t, 3 + number] = slope[t]
             else:
-                by_control[5 + t, number - 2] = slope[t]
+                by_control[FIRST_HITCH + t, number - 2] = slope[t]
     for number in range(trailers):
         hitch_slopes = (
             1.0 if number == 0 else 0.0,
@@ -126,7 +126,7 @@ def _fill_hitch_slopes(
         )
         slope = _hitch_slope(instants, lengths, h, unchanged, unchanged, hitch_slopes)
         for t in range(trailers):
-            by_state[5 + t, 5 + number] = slope[t]
+            by_state[FIRST_HITCH + t, FIRST_HITCH + number] = slope[t]
 
 
 @inlined
@@ -178,6 +178,6 @@ def differentiate_step(
                 by_control[r, number - 2] = slope[r]
     by_control[3, 0] = h
     by_control[4, 1] = h
-    if len(state) > 5:  # decided when compiling
+    if len(state) > FIRST_HITCH:  # decided when compiling
         _fill_hitch_slopes(state, speeds, turns, slopes, vehicle, by_state, by_control)  # type: ignore[arg-type]  # only cars with trailers have so many
     return after

@@ -14,7 +14,7 @@ Lengths here are canonical: ``scale`` says how many metres of the world outside 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 Corners = tuple[tuple[float, float], ...]  # of a convex polygon, metres around the reference point
 
@@ -111,6 +111,7 @@ class CarWithTrailers(NamedTuple):
 
 Vehicle = Car | DifferentialDrive | CarWithTrailers
 MOST_TRAILERS = 3
+FIRST_HITCH: Final = 5  # index into a state: hitch angles follow x, y, heading, speed and turning
 
 CAR = Car()
 DIFFERENTIAL_DRIVE = DifferentialDrive()
@@ -132,6 +133,11 @@ def name_of(vehicle: Vehicle) -> str:
 def trailers_of(vehicle: Vehicle) -> tuple[Trailer, ...]:
     """Return the trailers of a vehicle, the first one first; none if it pulls none."""
     return vehicle.trailers if isinstance(vehicle, CarWithTrailers) else ()
+
+
+def length_of_trailers(vehicle: Vehicle) -> float:
+    """How far behind the vehicle's reference point that of its last trailer is if all are straight, in m."""
+    return sum(trailer.hitch_length for trailer in trailers_of(vehicle))
 
 
 def state_names(vehicle: Vehicle) -> tuple[str, ...]:
