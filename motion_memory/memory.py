@@ -21,7 +21,13 @@ from planners.memory.memory import scale_fault
 from planners.ranked_plans import RankedPlan, ranked_plans
 from planners.search.query import Limits, usual_limits
 from planners.solve import improved, solve
-from planners.world.alignment import from_canonical, in_canonical, scaled, shifted, to_canonical
+from planners.world.alignment import (
+    from_canonical,
+    in_canonical,
+    to_canonical,
+    to_file_frame,
+    to_problem_frame,
+)
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, Plan, Problem
@@ -220,7 +226,7 @@ class Memory:
         """
         check_plan("plan", plan)
         read = self._read(problem)
-        return faults(read, _in_frame_of(read, plan), self.vehicle)
+        return faults(read, to_problem_frame(plan, read), self.vehicle)
 
     def learn(self, answers: Answer | RouteAnswer | Iterable[Answer | RouteAnswer], data: str | Path) -> int:
         """Keep plans that no memory had, for later libraries and runs (docs/learning-on-the-job.md).
@@ -282,14 +288,13 @@ class Memory:
         limits = usual_limits(canonical, time_limit)
         driven: Plan | None = None
         if current is not None:
-            near = _in_frame_of(problem, current_plan(current, self.vehicle))
+            near = to_problem_frame(current_plan(current, self.vehicle), problem)
             driven = in_canonical(near, alignment)
         with self._workspace() as workspace:
             attempt = self._attempt(canonical, limits, workspace, self.assist, driven)
             if improve_seconds > 0.0:
                 attempt = improved(attempt, canonical, improve_seconds, self.vehicle, workspace)
-        plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
-        plan = plan and shifted(plan, problem.offset)
+        plan = attempt.plan and to_file_frame(from_canonical(attempt.plan, alignment), problem)
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
@@ -331,9 +336,3 @@ def _parsed(text: str) -> Any:
         return parse_json(text, "the problem")
     except StorageError as error:
         raise ValueError(str(error)) from None
-
-
-def _in_frame_of(problem: Problem, plan: Plan) -> Plan:
-    """A plan in a file's frame and real metres, in those of the problem that was read from it."""
-    near = shifted(plan, (-problem.offset[0], -problem.offset[1]))
-    return scaled(near, 1.0 / problem.scale)

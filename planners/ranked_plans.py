@@ -15,7 +15,7 @@ from planners.search.free_goal import aimed_view
 from planners.search.manoeuvres.suitability import suits
 from planners.search.query import usual_limits
 from planners.sub_plan_answers import sub_plan_answer
-from planners.world.alignment import Alignment, from_canonical, scaled, shifted, to_canonical
+from planners.world.alignment import Alignment, from_canonical, to_canonical, to_file_frame
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.view import View
@@ -67,7 +67,9 @@ def ranked_plans(
     number, plan = moved.number, moved.plan
     if plan is None:
         number, plan = OF_PARTS, sub_plan_answer(library, view, vehicle).plan
-    return whole if plan is None else [RankedPlan(number, True, 0.0, _in_frame_of(problem, alignment, plan))]
+    if plan is None:
+        return whole
+    return [RankedPlan(number, True, 0.0, to_file_frame(from_canonical(plan, alignment), problem))]
 
 
 def _stored(
@@ -84,10 +86,6 @@ def _stored(
     ranked = []
     for i in ([best] if best >= 0 else []) + [i for i in best_plans(scores, k).tolist() if i != best]:
         free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), view.scene)
-        plan = _in_frame_of(problem, alignment, turned(memory.plans[i], canonical.start[2]))
+        plan = to_file_frame(from_canonical(turned(memory.plans[i], canonical.start[2]), alignment), problem)
         ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), plan))
     return ranked[:k]
-
-
-def _in_frame_of(problem: Problem, alignment: Alignment, plan: Plan) -> Plan:
-    return shifted(scaled(from_canonical(plan, alignment), problem.scale), problem.offset)

@@ -34,6 +34,7 @@ from planners.world.problem import (
     Plan,
     Problem,
     start_state,
+    starting_at,
 )
 from planners.world.vehicles.bodies import body_count, swept_boxes
 from planners.world.vehicles.vehicle import CAR, Trailer, Vehicle, trailers_of
@@ -123,7 +124,7 @@ class Router:
         sections: list[list[Leg]] = []
         paths = []
         for to_stop in problems:
-            problem = _from(state, to_stop)
+            problem = starting_at(to_stop, state)
             rest = rest_of(current, problem, self._vehicle, self._scene, self._workspace, until)
             if rest is None:
                 return None
@@ -151,7 +152,7 @@ class Router:
                 return self._doors.at_a_gap(
                     Stuck(stop.place, why, 0), (float(state[0]), float(state[1])), stop.place
                 )
-            problems[number] = _from(state, problems[number])
+            problems[number] = starting_at(problems[number], state)
             more = self._search.legs_to(ahead, state)
             if isinstance(more, Stuck):
                 more = self._by_other_ways(more, ahead, path, state)
@@ -274,12 +275,6 @@ class Router:
         if free.all() or not free[0]:
             return "the vehicle"
         return f"trailer {int(free.argmin())}" if bodies > 2 else "the trailer"
-
-
-def _from(state: Floats, problem: Problem) -> Problem:
-    """The problem from a ``state [S]`` on."""
-    x, y, heading, *motion = state.tolist()
-    return replace(problem, start=(x, y, heading), start_motion=tuple(motion))
 
 
 def _goal_name(number: int, stops: Sequence[Stop]) -> str:

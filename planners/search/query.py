@@ -13,7 +13,7 @@ from planners.world.arrays import Floats, Integers
 from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Plan, Problem, start_state, starting_at
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
@@ -104,7 +104,6 @@ def after_prefix(query: Query) -> Query:
     """The query as it is asked where its prefix ends."""
     if query.prefix is None:
         return query
-    x, y, heading, *motion = query.prefix.states[-1].tolist()
-    problem = replace(query.problem, start=(x, y, heading), start_motion=tuple(motion))
+    problem = starting_at(query.problem, query.prefix.states[-1])
     limits = replace(query.limits, bound_s=query.limits.bound_s - cost_of(query.prefix, query.vehicle))
     return replace(query, problem=problem, limits=limits, prefix=None)

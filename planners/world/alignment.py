@@ -197,6 +197,17 @@ def shifted(plan: Plan, offset: Point) -> Plan:
     return Plan(states, plan.controls, plan.dt)
 
 
+def to_file_frame(plan: Plan, problem: Problem) -> Plan:
+    """Move a plan from the frame of its problem into that of the problem's file, in real metres."""
+    return shifted(scaled(plan, problem.scale), problem.offset)
+
+
+def to_problem_frame(plan: Plan, problem: Problem) -> Plan:
+    """Move a plan from the frame of a problem's file, in real metres, into that of the problem."""
+    near = shifted(plan, (-problem.offset[0], -problem.offset[1]))
+    return scaled(near, 1.0 / problem.scale)
+
+
 def _groups(problem: Problem) -> list[list[Floats]]:
     """List the obstacles, each as convex pieces ``[n, 2]``."""
     pieces = problem.obstacles.pieces()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,3 +154,9 @@ def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
     state[3] = max(vehicle.min_speed, 0.0)
     state[3 : 3 + len(problem.start_motion)] = problem.start_motion
     return state
+
+
+def starting_at(problem: Problem, state: Floats) -> Problem:
+    """The problem as it is asked from a ``state [S]`` on."""
+    x, y, heading, *motion = state.tolist()
+    return replace(problem, start=(x, y, heading), start_motion=tuple(motion))

@@ -10,7 +10,7 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.authority.authority import faults
-from planners.world.problem import GOAL_RADIUS, Obstacles, Plan, Problem, obstacles_of
+from planners.world.problem import GOAL_RADIUS, Obstacles, Plan, Problem, obstacles_of, starting_at
 from storage.exchange.plans import PlanRecord
 
 ROOM_M: Final = 1e6  # around a plan that is judged by itself
@@ -18,13 +18,11 @@ ROOM_M: Final = 1e6  # around a plan that is judged by itself
 
 def by_itself(plan: Plan) -> Problem:
     """The problem that a plan answers where nothing is in its way."""
-    x, y, heading, *motion = plan.states[0].tolist()
+    x, y, heading = plan.states[0, :3].tolist()
     goal = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
     bounds = (x - ROOM_M, y - ROOM_M, x + ROOM_M, y + ROOM_M)
-    start = (x, y, heading)
-    return Problem(
-        "stored", "stored", start, goal, GOAL_RADIUS, bounds, obstacles_of([]), start_motion=tuple(motion)
-    )
+    problem = Problem("stored", "stored", (x, y, heading), goal, GOAL_RADIUS, bounds, obstacles_of([]))
+    return starting_at(problem, plan.states[0])
 
 
 class MapJudge:

@@ -21,7 +21,7 @@ from planners.memory.memory import Memory, scale_fault
 from planners.search.query import usual_limits
 from planners.search.registry import PLANNERS
 from planners.solve import solve
-from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
+from planners.world.alignment import from_canonical, to_canonical, to_file_frame
 from planners.world.arrays import Floats
 from planners.world.classes.families import class_or_family
 from planners.world.driving_cost import runs_of
@@ -120,7 +120,7 @@ def _answer(
     use: str, attempt: Attempt, milliseconds: float, problem: Problem, plan: Plan | None, vehicle: Vehicle
 ) -> dict[str, Any]:
     """An attempt as the editor shows it, in the world's own frame, and its plan in that of the problem."""
-    own = plan and shifted(scaled(plan, problem.scale), problem.offset)
+    own = plan and to_file_frame(plan, problem)
     way = np.round(own.states[:, :2], 2).tolist() if own else []
     runs = runs_of(plan, vehicle) if plan else []
     return {
