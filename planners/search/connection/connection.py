@@ -110,7 +110,7 @@ def chooses_pace(vehicle: Vehicle) -> bool:
 def straight_speed(top: float, vehicle: Vehicle) -> float:
     """The largest speed (m/s) on the straight parts of a word whose arcs are driven with up to ``top``."""
     turning = turning_speed(vehicle)
-    if vehicle.min_speed == 0.0 and turning > top and chooses_pace(vehicle):
+    if turning > top and chooses_pace(vehicle):
         return vehicle.max_speed
     if turning == vehicle.max_speed:
         return top

@@ -129,7 +129,6 @@ class Manoeuvring:
         self.least_seconds = self._least_seconds() if counting_time(vehicle) == vehicle else math.inf
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
-        self._grow(0)  # compiled, if need be, before the planner's clock runs
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
         """The same search from its beginning, which goes on from known endings too, in buffers of its own."""

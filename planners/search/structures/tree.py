@@ -193,10 +193,8 @@ def connect_to_goal(
     ``top`` is the largest speed in m/s. Who cannot reverse tries to turn more slowly first, and sharply, if
     that is quicker (``best_pace``).
     """
-    pace = top
-    if vehicle.min_speed == 0.0:
-        store(tree.connection.states, 0, load(tree.states, vertex, vehicle))
-        pace = best_pace(tree.connection, tree.gears[vertex], goal, top, vehicle)
+    store(tree.connection.states, 0, load(tree.states, vertex, vehicle))
+    pace = best_pace(tree.connection, tree.gears[vertex], goal, top, vehicle)
     if _connect_with(tree, vertex, goal, pace, vehicle, scene):
         return True
     return pace < top and _connect_with(tree, vertex, goal, top, vehicle, scene)
