@@ -213,7 +213,7 @@ def in_time(
 ) -> tuple[float, float]:
     """The controls, reduced if the motion after them could not become that of ``last`` in ``left`` steps.
 
-    Who is too fast for that already gets a control beyond its limit, which ``shorten`` does not accept.
+    One that is too fast for that already gets a control beyond its limit, which ``shorten`` does not accept.
     """
     first, second = _can_end(state, first, second, left, last, vehicle)
     return admissible(state, first, second, vehicle)

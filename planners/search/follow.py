@@ -14,7 +14,7 @@ from planners.search.gust import GustSettings
 from planners.search.outcome import Outcome
 from planners.search.query import Guide, Query
 from planners.search.rrt import along_guide, growing
-from planners.search.search_loop import attempt
+from planners.search.search_loop import search
 from planners.search.structures.roadmap import (
     Roadmap,
     RoadmapSettings,
@@ -209,4 +209,4 @@ def follow(query: Query, settings: FollowSettings) -> Outcome:
         _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, scene, rng)
 
     explore, along = growing(query), along_guide(query)
-    return attempt(query, settings.gust.restart_after, prepare, grow, explore, along)
+    return search(query, settings.gust.restart_after, prepare, grow, explore, along)

@@ -15,7 +15,7 @@ from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import state_size
 
 NODES: Final = 100_000  # of its tree, which is not the tree of the planner beside it
-A_TIME: Final = 30  # work of an expansion, about: so many are made at once that the allowance is just met
+WORK_AN_EXPANSION: Final = 30  # about: so many are made at once that the allowance is just met
 LEAST_EXPANSIONS: Final = 4  # at once: calling a kernel costs as much
 
 
@@ -63,6 +63,6 @@ class GuidedSearch:
                 self._trial += 1
                 self._restart_at = self.expansions + RRT.restart_after * 2**self._trial
                 trees.prune(tree, self._prefix, self._query.scene.bounds)
-            until = self.expansions + max(left // A_TIME, LEAST_EXPANSIONS)
+            until = self.expansions + max(left // WORK_AN_EXPANSION, LEAST_EXPANSIONS)
             self._grow(tree, self._goal, min(until, self._restart_at))
         return trees.plan_to_goal(tree, self._dt)

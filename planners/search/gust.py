@@ -12,7 +12,7 @@ from planners.search.guides.sampling import in_bounds, in_disc, uniform
 from planners.search.outcome import Outcome
 from planners.search.query import Guide, Query
 from planners.search.rrt import along_guide, growing
-from planners.search.search_loop import attempt
+from planners.search.search_loop import search
 from planners.search.structures import tree as trees
 from planners.search.structures.neighbours import nearest_for
 from planners.search.structures.roadmap import CHECKS as ROADMAP_CHECKS
@@ -227,4 +227,4 @@ def gust(query: Query, settings: GustSettings) -> Outcome:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, scene, rng)
 
     explore, along = growing(query), along_guide(query)
-    return attempt(query, settings.restart_after, prepare, grow, explore, along)
+    return search(query, settings.restart_after, prepare, grow, explore, along)

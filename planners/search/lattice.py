@@ -18,7 +18,7 @@ from planners.search.outcome import Other, Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
 from planners.search.rrt import growing
-from planners.search.search_loop import attempt
+from planners.search.search_loop import search
 from planners.search.structures import tree as trees
 from planners.search.structures.cost_to_go import (
     allocate_cost_to_go,
@@ -225,7 +225,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
 
     at_random = growing(query)
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    outcome = attempt(
+    outcome = search(
         replace(query, beside=beside),
         _restart_after(query, settings),
         prepare,

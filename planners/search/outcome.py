@@ -8,12 +8,12 @@ from typing import Final, NamedTuple
 
 from planners.world.problem import Plan
 
-EXPANSION: Final = 5  # collision checks that take as long as all else in an expansion
+CHECKS_AN_EXPANSION: Final = 5  # collision checks that take as long as all else in an expansion
 
 
 def work_of(collision_checks: int, expansions: int) -> int:
     """Return what a search has cost, in collision checks. Decisions rest on this: no two clocks agree."""
-    return collision_checks + EXPANSION * expansions
+    return collision_checks + CHECKS_AN_EXPANSION * expansions
 
 
 class Status(StrEnum):

@@ -9,7 +9,7 @@ from numpy.random import BitGenerator
 from planners.search.guides.sampling import guided
 from planners.search.outcome import Outcome
 from planners.search.query import NO_GUIDE, Guide, Query
-from planners.search.search_loop import Grow, attempt
+from planners.search.search_loop import Grow, search
 from planners.search.structures import tree as trees
 from planners.search.structures.neighbours import nearest
 from planners.world.arrays import Floats
@@ -71,7 +71,7 @@ def along_guide(query: Query) -> Grow | None:
 def rrt(query: Query, settings: RrtSettings) -> Outcome:
     """Plan from the problem's start to its goal disc; a guide leads the tree along its paths."""
     guide = NO_GUIDE if query.guide is None else query.guide
-    return attempt(
+    return search(
         query,
         settings.restart_after,
         lambda tree, goal, trial: None,

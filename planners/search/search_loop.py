@@ -40,7 +40,7 @@ def _first_status(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) ->
     return 3 if reaches(state, goal) else 0
 
 
-def attempt(
+def search(
     query: Query,
     restart_after: int,
     prepare: Callable[[trees.Tree, Floats, int], None],
@@ -69,6 +69,9 @@ def attempt(
         follow_guide: grows the first tree for ``GUIDED`` expansions, after which it is mostly solved.
         explore_from: the first trial that explores.
         is_enclosed: whether nothing leads away from the goal, so that the search ends.
+
+    Returns:
+        How it ended, the plan if there is one, and the work that it took.
     """
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
     began, slice_ = working_clock(), SLICE if limits.seconds > SHORT_S else SHORT_SLICE

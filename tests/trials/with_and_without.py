@@ -23,7 +23,7 @@ from dashboards.cells import markdown_table
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
 from dashboards.statistics.panels import Panel, panels
 from planners.attempt import WITHOUT_MEMORY
-from planners.search.outcome import EXPANSION
+from planners.search.outcome import CHECKS_AN_EXPANSION
 from planners.world.arrays import Floats
 from storage.tables.attempts import read_attempts
 
@@ -63,7 +63,7 @@ def percent(share: float, low: float, high: float) -> str:
 def lines_of(panel: Panel) -> Iterator[list[str]]:
     """The cells of a class, a line for each of ``WAYS`` that was measured."""
     times, driving, solved = panel.milliseconds(), panel.matrix("duration_s"), panel.matrix("solved")
-    works = panel.matrix("collision_checks") + EXPANSION * panel.matrix("expansions")
+    works = panel.matrix("collision_checks") + CHECKS_AN_EXPANSION * panel.matrix("expansions")
     rows = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
     recalled = panel._replace(rows=rows).matrix("recalled")
     total = driving + 1e-3 * times

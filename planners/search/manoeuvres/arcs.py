@@ -15,7 +15,7 @@ from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
 LEAST: Final = 0.001  # of it: the stride of a vehicle that hardly moves in a step
 COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
-FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
+FINE_LOOKS: Final = 5  # so many looks where the way is narrow, each with a smaller margin
 # a step along an arc: where it leads from the origin, and the speed (m/s) and fifth variable on it
 Leap = tuple[float, float, float, float, float]
 
@@ -48,7 +48,7 @@ class Stride(NamedTuple):
 
     metres: float
     whole: Leap
-    fine: Leap  # ``FINE`` of them
+    fine: Leap  # ``FINE_LOOKS`` of them
 
 
 @inlined
@@ -64,7 +64,7 @@ def stride_in(state: State, gear: float, bend: float, metres: float, vehicle: Ve
     """The stride of so many ``metres``, at most ``stride_of``, in a gear (1 or -1); any ``state`` will do."""
     speed = gear * metres / vehicle.dt
     whole = leap_of(state, speed, bend, vehicle)
-    return Stride(metres, whole, leap_of(state, speed / FINE, bend, vehicle))
+    return Stride(metres, whole, leap_of(state, speed / FINE_LOOKS, bend, vehicle))
 
 
 @inlined
@@ -82,7 +82,7 @@ def leapt(state: State, leap: Leap, vehicle: Vehicle) -> State:
 def stride_along(state: State, stride: Stride, vehicle: Vehicle, scene: Scene) -> tuple[State, float, int]:
     """Drive on for a stride of an arc, as far as it is free.
 
-    Where a look with the margin of the whole stride finds no room, there are ``FINE`` short ones.
+    Where a look with the margin of the whole stride finds no room, there are ``FINE_LOOKS`` short ones.
 
     Args:
         state: from where.
@@ -97,12 +97,12 @@ def stride_along(state: State, stride: Stride, vehicle: Vehicle, scene: Scene) -
     after = leapt(state, stride.whole, vehicle)
     if state_is_free(after, vehicle, scene):
         return after, metres, 1
-    for k in range(FINE):
+    for k in range(FINE_LOOKS):
         after = leapt(state, stride.fine, vehicle)
         if not state_is_free(after, vehicle, scene):
-            return state, k * metres / FINE, k + 2
+            return state, k * metres / FINE_LOOKS, k + 2
         state = after
-    return state, metres, FINE + 1
+    return state, metres, FINE_LOOKS + 1
 
 
 @inlined

@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, radius_at
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
+from planners.search.manoeuvres.arcs import FINE_LOOKS, at_pace, stride_of
 from planners.search.manoeuvres.joining import Join, allocate_join
 from planners.search.manoeuvres.near_meetings import NearMeetings, allocate_near_meetings
 from planners.search.manoeuvres.pace import fill_pace
@@ -145,7 +145,9 @@ def _pace(level: int, gear: float, top: float, vehicle: Vehicle) -> float:
     """The speed (m/s) of a level, of which level 0 is the quickest, where ``top`` is full speed."""
     if level < len(TOPS):
         return TOPS[level] * top
-    return min(TOPS[-1] * top, CREEPS[level - len(TOPS)] * stride_of(gear, vehicle) / (FINE * vehicle.dt))
+    return min(
+        TOPS[-1] * top, CREEPS[level - len(TOPS)] * stride_of(gear, vehicle) / (FINE_LOOKS * vehicle.dt)
+    )
 
 
 @lean

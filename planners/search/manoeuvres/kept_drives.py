@@ -11,7 +11,7 @@ from planners.world.problem import Plan
 
 
 class KeptDrives:
-    """Of each kind the drive that is estimated quickest, of as many kinds as are worth driving."""
+    """Of each kind the drive that is estimated cheapest, of as many kinds as are worth driving."""
 
     def __init__(self, drive: Drive, before: Plan) -> None:
         """Begin with none.
@@ -44,12 +44,12 @@ class KeptDrives:
         return bool(self._drive.counts[2])
 
     @property
-    def least_seconds(self) -> float:
-        """What the quickest takes, by an estimate; infinite if there is none."""
-        return float(self._drive.ways.seconds.min())
+    def least_cost(self) -> float:
+        """What the cheapest costs, by an estimate in seconds; infinite if there is none."""
+        return float(self._drive.ways.costs.min())
 
-    def quickest_first(self) -> list[Other]:
-        """All drives, the one first that is estimated quickest; last those held that gave way to others."""
-        order = np.argsort(self._drive.ways.seconds, kind="stable")
+    def cheapest_first(self) -> list[Other]:
+        """All drives, the one first that is estimated cheapest; last those held that gave way to others."""
+        order = np.argsort(self._drive.ways.costs, kind="stable")
         kept = [other for k in order if (other := self._of_kinds[k]) is not None]
         return kept + [other for other in self._soon if all(other is not each for each in kept)]

@@ -22,7 +22,7 @@ LEVELS: Final = (
     (1 << 30, Outward(cell=0.02, headings=128, greed=12.0, worst=True), 12.0),
     (1 << 30, Outward(cell=0.05, headings=1024, greed=12.0, worst=True, stride=0.2, marks=INCHES), 12.0),
 )
-FINE: Final = 5  # the level from which on cells are fine
+FINE_LEVEL: Final = 5  # the number of the first level whose cells are fine
 CROWDING: Final = 0.5  # with trailers: there are many more states that hardly differ
 SPOT: Final = 0.25  # of a body's length: the radius in which it turns nearly on the spot
 

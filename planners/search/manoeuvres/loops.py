@@ -239,5 +239,5 @@ def loop(
     k = numbers[number]
     curvatures = np.array([curvature_of(bend, vehicle) for bend in loops.bends[k]])
     take_arcs(drive.ways, loops.metres[k], loops.metres[k] * curvatures)
-    drive.ways.last_seconds[0] = cost_of_drive(drive, vehicle)
+    drive.ways.last_cost[0] = cost_of_drive(drive, vehicle)
     return True

@@ -14,14 +14,14 @@ from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.enclosure import is_closed
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.kept_drives import KeptDrives
-from planners.search.manoeuvres.levels import FINE, LEVELS, suited
+from planners.search.manoeuvres.levels import FINE_LEVEL, LEVELS, suited
 from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
 from planners.search.manoeuvres.narrow_ways import too_narrow
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
-from planners.search.manoeuvres.outward import TURN, begin_outward, grow_trees, room_around
+from planners.search.manoeuvres.outward import EXPANSIONS_A_TURN, begin_outward, grow_trees, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
-from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.shots import OtherEnd
 from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
 from planners.search.manoeuvres.variants import (
     at_its_slowest,
@@ -35,7 +35,7 @@ from planners.search.manoeuvres.variants import (
 from planners.search.manoeuvres.ways import allocate_ways
 from planners.search.outcome import Other
 from planners.search.query import Endings, Query, after_prefix, prefix_of
-from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go, metres_to_go
+from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go, metres_to_go
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
@@ -44,9 +44,9 @@ from planners.world.goal import HEADING, LEAST_SPEED, MOST_SPEED, SLACK, X, Y
 from planners.world.problem import start_state
 from planners.world.vehicles.vehicle import FIRST_HITCH, state_size
 
-MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
-FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
-BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
+MEETING: Final = 3  # with trailers a level gets so many times the expansions: trees meet where they are wide
+FIRST_MEETING: Final = 4000  # expansions of the first level then: with more greed drives get longer
+BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends, and that for tight goals
 STUCK: Final = 1000  # expansions where cells are fine, after which the search is stuck
 PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
@@ -59,16 +59,8 @@ AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
-def allocate_way_from_start(goes_on: bool) -> CostToGo:
-    """Buffers of their own, since the search beside this one needs the way to the goal.
-
-    They are others if the search goes on from a prefix: one with known endings may still need the first.
-    """
-    return allocate_cost_to_go()
-
-
-def allocate_trees(state_size: int, number: int) -> tuple[PoseTree, PoseTree]:
-    """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
+def allocate_trees(state_size: int) -> tuple[PoseTree, PoseTree]:
+    """Trees out of the goal and out of the start, of states of ``state_size`` numbers."""
     return allocate_pose_tree(state_size), allocate_pose_tree(state_size)
 
 
@@ -95,22 +87,25 @@ class Manoeuvring:
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
         ends = np.abs([start[0, FIRST_HITCH:], pose_of(goal, size)[FIRST_HITCH:]]).max(0)
-        self._leaving = less_folded(vehicle, ends)
-        self._outgoing = time_reversed(self._leaving)
-        self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
+        self._out_of_start = less_folded(vehicle, ends)
+        self._out_of_goal = time_reversed(self._out_of_start)
+        self._goal_tree, self._start_tree = query.workspace.buffers(allocate_trees, size)
         self._drive = query.workspace.buffers(allocate_drive, size)
         self._drive.target[[LEAST_SPEED, MOST_SPEED]] = -SLACK, SLACK
         if vehicle.min_speed > 0.0:
             speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
-        go = query.workspace.buffers(allocate_way_from_start, len(self._before.controls) > 0)
+        # not the buffers of the search beside this one, which needs the way to the goal, nor, after a prefix,
+        # those without one, which a search with known endings may still need
+        way = "to the start" if len(self._before.controls) == 0 else "to the end of the prefix"
+        go = query.workspace.buffers(allocate_cost_to_go, key=way)
         self._occupied, self._window, self._go = occupied.copy(), window, go
         fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
         table = seconds_to_pose(without_trailers(counting_time(vehicle)))
         known = table, no_endings(size), word_radius(vehicle), goal[:2]
-        self._known = FromStart(start, go, *known, outward=True)
+        self._start_end = OtherEnd(start, go, *known, from_goal=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
-        self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
+        self._goal_end = OtherEnd(pose_of(goal, size)[np.newaxis], to_goal, *known, from_goal=False)
         self._found = KeptDrives(self._drive, self._before)
         self.meets = meets(start[0], vehicle)
         self._stands = vehicle.min_speed <= 0.0 and bool(vehicle.first_order or start[0, 3] == 0.0)
@@ -132,9 +127,9 @@ class Manoeuvring:
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
         """The same search from its beginning, which goes on from known endings too, in buffers of its own."""
-        other = self._another(query, 1)
-        other._known = self._known._replace(endings=endings)
-        other._known_there = self._known_there._replace(endings=endings)
+        other = self._another(query, "joining")
+        other._start_end = self._start_end._replace(endings=endings)
+        other._goal_end = self._goal_end._replace(endings=endings)
         other._begin_at_coarsest()
         if not np.any(other._nodes >= 0):
             other._level = len(LEVELS)  # nothing that is known is free here
@@ -142,16 +137,17 @@ class Manoeuvring:
 
     def of_slimmer(self, query: Query, share: float) -> Manoeuvring:
         """The same search from its beginning with slimmer bodies (``slimmer``), in buffers of its own."""
-        other = self._another(query, 2)
-        vehicles = self._vehicle, self._leaving, self._outgoing
-        other._vehicle, other._leaving, other._outgoing = (slimmer(each, share) for each in vehicles)
+        other = self._another(query, "slimmer")
+        vehicles = self._vehicle, self._out_of_start, self._out_of_goal
+        other._vehicle, other._out_of_start, other._out_of_goal = (slimmer(each, share) for each in vehicles)
         other._begin_at_coarsest()
         return other
 
-    def _another(self, query: Query, number: int) -> Manoeuvring:
-        """A search of another ``number`` than this one, which still has to begin, and does not mend."""
+    def _another(self, query: Query, name: str) -> Manoeuvring:
+        """A search with trees of its own, kept by ``name``, which still has to begin, and does not mend."""
         other = copy.copy(self)
-        other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
+        size = state_size(query.vehicle)
+        other._goal_tree, other._start_tree = query.workspace.buffers(allocate_trees, size, key=name)
         other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
         other._found = KeptDrives(other._drive, self._before)
         other._may_loop = other._may_mend = False
@@ -167,13 +163,13 @@ class Manoeuvring:
         """Whether all drives out of the goal end near it, with nothing left to open at any level."""
         if not self.is_over or self.kept:
             return False
-        return is_closed(self._tree, self._goal, self._query.problem.bounds, self._vehicle)
+        return is_closed(self._goal_tree, self._goal, self._query.problem.bounds, self._vehicle)
 
     @property
     def is_stuck(self) -> bool:
         """Whether no drive was found where cells are coarse, nor soon where they are fine."""
         spent = self.expansions - self._before_fine
-        return self._level >= FINE and not self.kept and (spent >= STUCK or self.is_over)
+        return self._level >= FINE_LEVEL and not self.kept and (spent >= STUCK or self.is_over)
 
     @property
     def _expansions(self) -> int:
@@ -224,7 +220,7 @@ class Manoeuvring:
         """Whether all that was found takes long, and only the tree out of the goal has grown."""
         if self.meets or not self._stands or self._grows_both or not self.kept:
             return False
-        return self._found.least_seconds > DETOUR * self.least_seconds
+        return self._found.least_cost > DETOUR * self.least_seconds
 
     def _search_from_start(self, end: int, until: float) -> None:
         """Search once more, out of the start alone, and keep what is found.
@@ -235,7 +231,9 @@ class Manoeuvring:
         self._level = self._spent = 0
         self._begin()
         while self.expansions < end and (left := until - working_clock()) > 0.0:
-            found, used = self._grow(min(end - self.expansions, _turns(left) * TURN), from_start=True)
+            found, used = self._grow(
+                min(end - self.expansions, _turns(left) * EXPANSIONS_A_TURN), from_start=True
+            )
             if found:
                 self._found.add_found()
             elif used == 0:
@@ -247,8 +245,8 @@ class Manoeuvring:
             return 0
         per = PER_SQUARE_SECOND_MEETING if self.meets else PER_SQUARE_SECOND
         per = PER_SQUARE_SECOND_MENDED if self._is_mended else per
-        seconds = self._found.least_seconds
-        return int(max(min(per * seconds * seconds, longest), least))
+        cost = self._found.least_cost
+        return int(max(min(per * cost * cost, longest), least))
 
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
@@ -262,8 +260,8 @@ class Manoeuvring:
             level_ends = self._expansions - self._spent
             turns = _turns(left)
             if self._may_mend:
-                turns = min(turns, max(math.ceil((self._mend_at - self.expansions) / TURN), 1))
-            found, used = self._grow(min(end - self.expansions, level_ends, turns * TURN))
+                turns = min(turns, max(math.ceil((self._mend_at - self.expansions) / EXPANSIONS_A_TURN), 1))
+            found, used = self._grow(min(end - self.expansions, level_ends, turns * EXPANSIONS_A_TURN))
             if found:
                 self._is_mended = self._is_mended and bool(self.kept)
                 return True
@@ -273,7 +271,7 @@ class Manoeuvring:
             ended = self._ended and self._level + 1 < len(LEVELS)  # nothing is left to open at the start
             if is_over or ended:
                 self._level, self._spent = self._level + 1, 0
-                if self._level == FINE:
+                if self._level == FINE_LEVEL:
                     self._before_fine = self.expansions
                     self._close_narrow_ways()
                 self._begin()
@@ -289,16 +287,16 @@ class Manoeuvring:
         narrow = too_narrow(self._scene, self._window, self._vehicle, self._query.workspace)
         x, y = self._query.problem.start[:2]
         fill_cost_to_go(self._occupied | narrow, x, y, AROUND_START_M, self._window, go)
-        self._known = self._known._replace(go=go)
+        self._start_end = self._start_end._replace(go=go)
 
     def _loops(self, until: float) -> bool:
         """Turn round in a loop, once; whether that gave a drive."""
         if not self._may_loop:
             return False
         self._may_loop = False
-        ends = self._known.start, self._known_there.start
+        ends = self._start_end.root, self._goal_end.root
         return loop(
-            self._query, self._drive, *ends, self._known.radius, self._vehicle, min(until, self._until)
+            self._query, self._drive, *ends, self._start_end.radius, self._vehicle, min(until, self._until)
         )
 
     def _mends(self, until: float) -> bool:
@@ -309,39 +307,39 @@ class Manoeuvring:
         self._mended_at = self.expansions
         while self._mend_at <= self.expansions:
             self._mend_at *= 2
-        trees = self._other, self._tree
+        trees = self._start_tree, self._goal_tree
         mended = mend(self._query, self._drive, *trees, self._vehicle, min(until, self._until))
         self._is_mended = self._is_mended or mended
         return mended
 
     @property
     def kept(self) -> list[Other]:
-        """The drives of different kinds that were found, the one first that is estimated quickest."""
-        return self._found.quickest_first()
+        """The drives of different kinds that were found, the one first that is estimated cheapest."""
+        return self._found.cheapest_first()
 
     def _least_seconds(self) -> float:
         """The time from the start to the goal if nothing is in the way, or only cells that are not free."""
-        known, top = self._known, self._vehicle.max_speed
-        x, y, heading = known.start[0, :3].tolist()
+        known, top = self._start_end, self._vehicle.max_speed
+        x, y, heading = known.root[0, :3].tolist()
         pose = float(self._goal[X]), float(self._goal[Y]), float(self._goal[HEADING])
         turns = seconds_from(x, y, heading, pose, known.table, top)
         return max(turns, metres_to_go(*pose[:2], known.go) / top)
 
     def _begin_at_coarsest(self) -> None:
-        self._known = self._known._replace(go=self._go)
-        self._nodes = np.empty(len(self._known.endings.follows), np.int32)
+        self._start_end = self._start_end._replace(go=self._go)
+        self._nodes = np.empty(len(self._start_end.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
-        self._checks_before = int(self._tree.counts[CHECKS] + self._other.counts[CHECKS])
+        self._checks_before = int(self._goal_tree.counts[CHECKS] + self._start_tree.counts[CHECKS])
         self._begin()
 
     def _begin(self) -> None:
         """Plant the tree of the present level, if there is one."""
         if not self.is_over:
-            plant_root(self._tree, self._known_there.start[0])
-            plant_root(self._other, self._known.start[0])
+            plant_root(self._goal_tree, self._goal_end.root[0])
+            plant_root(self._start_tree, self._start_end.root[0])
             level = suited(self._level, self._vehicle)
-            begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
+            begin_outward(self._goal_tree, self._start_end, self._nodes, level, self._vehicle, self._scene)
             forget_near(self._drive.near)
 
     def _grow(self, most: int, from_start: bool = False) -> tuple[bool, int]:
@@ -349,8 +347,8 @@ class Manoeuvring:
 
         Without trailers the tree out of the start grows, too, if only that is tight, or later; or alone.
         """
-        goal_side = self._tree, self._known, self._outgoing
-        start_side = self._other, self._known_there, self._leaving
+        goal_side = self._goal_tree, self._start_end, self._out_of_goal
+        start_side = self._start_tree, self._goal_end, self._out_of_start
         first, second = (start_side, goal_side) if from_start else (goal_side, start_side)
         (tree, known, outgoing), (other, known_there, leaving) = first, second
         both = self._grows_both and not from_start
@@ -381,7 +379,7 @@ class Manoeuvring:
     @property
     def checks(self) -> int:
         """How often obstacles were looked at so far."""
-        return int(self._tree.counts[CHECKS] + self._other.counts[CHECKS]) - self._checks_before
+        return int(self._goal_tree.counts[CHECKS] + self._start_tree.counts[CHECKS]) - self._checks_before
 
     @property
     def joined(self) -> bool:

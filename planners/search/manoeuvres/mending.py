@@ -17,7 +17,7 @@ from planners.search.query import Query
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import Vehicle
 
-TRIES: Final = 4  # ways at a time
+WAYS_AT_A_TIME: Final = 4  # that are optimised together
 
 
 def mend(
@@ -38,7 +38,7 @@ def mend(
     pairs: list[tuple[PoseTree, int, PoseTree, int]] = []
     ways: list[Floats] = []
     for k in left[np.argsort(near.off[left], kind="stable")]:
-        if len(ways) == TRIES:
+        if len(ways) == WAYS_AT_A_TIME:
             break
         near.tried[k] = 1
         pair = before, int(near.lasts[k]), tree, int(near.nodes[k])
@@ -50,7 +50,7 @@ def mend(
     if number < 0:
         return False
     meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
-    drive.ways.last_seconds[0] = cost_of_drive(drive, vehicle)
+    drive.ways.last_cost[0] = cost_of_drive(drive, vehicle)
     return last_is_worth(drive.ways)
 
 

@@ -21,7 +21,9 @@ from planners.world.vehicles.dynamics import load, store
 from planners.world.vehicles.vehicle import FIRST_HITCH, Vehicle
 
 MOST: Final = 64  # of them are remembered, by a search that mends
-APART: Final = PLACE  # lengths of the first body: of those that are nearer to each other one is
+SAME_PLACE: Final = (
+    PLACE  # lengths of the first body: of those that are nearer to one another only one is remembered
+)
 SIZE: Final = 0  # index into NearMeetings.counts
 
 
@@ -60,7 +62,7 @@ def note_near(
     off = 0.0
     for k in range(FIRST_HITCH, len(here)):
         off += abs(here[k] - there[k])
-    apart = APART * (vehicle.front + vehicle.rear)
+    apart = SAME_PLACE * (vehicle.front + vehicle.rear)
     at = -1
     for i in range(near.counts[SIZE]):
         state = load(before.states, near.lasts[i], vehicle)

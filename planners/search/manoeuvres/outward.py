@@ -10,7 +10,7 @@ import math
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
-from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_in, stride_of
+from planners.search.manoeuvres.arcs import FINE_LOOKS, STRIDE, at_pace, stride_along, stride_in, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
@@ -27,8 +27,8 @@ from planners.search.manoeuvres.pose_tree import (
     region_of,
     seconds_after,
 )
-from planners.search.manoeuvres.shots import FromStart, shoot_between, shoot_with_trailers
-from planners.search.manoeuvres.ways import slowest_kept
+from planners.search.manoeuvres.shots import OtherEnd, shoot_between, shoot_with_trailers
+from planners.search.manoeuvres.ways import dearest_kept
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
 from planners.world.arrays import Floats, Integers, Pose
@@ -41,7 +41,7 @@ from planners.world.vehicles.vehicle import FIRST_HITCH, CarWithTrailers, Vehicl
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
-TURN: Final = 64  # expansions of both trees together before each has another turn
+EXPANSIONS_A_TURN: Final = 64  # of both trees together
 NO_BEND: Final = math.nan
 
 
@@ -54,7 +54,7 @@ class Outward(NamedTuple):
     marks: tuple[float, ...] = (3.0, 8.0, 15.0, 30.0, 50.0, 80.0)  # times ``STRIDE``: where arcs may end
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, ``MOST_HEADINGS`` at most
-    greed: float = 1.5  # weight of the time from the start
+    greed: float = 1.5  # weight of the time that is left to the other end
     crowding: float = 0.0  # seconds by which a node counts as farther for each opened in its region
     worst: bool = False  # with trailers that of the first or last body, whichever is longer, not the mean
 
@@ -95,25 +95,26 @@ def _last_body(state: State, vehicle: CarWithTrailers) -> Pose:
 
 
 @inlined
-def _seconds_of_body(root: Pose, pose: Pose, known: FromStart, vehicle: Vehicle) -> float:
-    """The time from the start to a pose, or from that to the goal, if nothing is in the way."""
-    if not known.outward:
+def _seconds_of_body(root: Pose, pose: Pose, known: OtherEnd, vehicle: Vehicle) -> float:
+    """The time between a pose of a body and its ``root`` at the other end, if nothing is in the way."""
+    if not known.from_goal:
         root, pose = pose, root
     return float(seconds_from(root[0], root[1], root[2], pose, known.table, vehicle.max_speed))
 
 
 @inlined
-def _least_seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
-    """The time from the start if nothing is in the way."""
-    root = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+def _least_seconds_left(state: State, known: OtherEnd, vehicle: Vehicle) -> float:
+    """The time between a state and the other end, if nothing is in the way."""
+    root = known.root[0, 0], known.root[0, 1], known.root[0, 2]
     return _seconds_of_body(root, (state[0], state[1], state[2]), known, vehicle)
 
 
 @inlined
-def _seconds_from_start(state: State, known: FromStart, settings: Outward, vehicle: Vehicle) -> float:
-    turns = _least_seconds_from_start(state, known, vehicle)
+def _seconds_left(state: State, known: OtherEnd, settings: Outward, vehicle: Vehicle) -> float:
+    """The same, with the last trailer and with what is in the way of a point."""
+    turns = _least_seconds_left(state, known, vehicle)
     if len(state) > FIRST_HITCH:  # decided when compiling
-        root = load(known.start, 0, vehicle)
+        root = load(known.root, 0, vehicle)
         there, here = _last_body(root, vehicle), _last_body(state, vehicle)  # type: ignore[arg-type]  # the state of a car is shorter
         last = _seconds_of_body(there, here, known, vehicle)
         turns = max(turns, last) if settings.worst else 0.5 * (turns + last)
@@ -142,7 +143,7 @@ def _let_wait(
 
 @lean
 def begin_outward(
-    tree: PoseTree, known: FromStart, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
+    tree: PoseTree, known: OtherEnd, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
 ) -> None:
     """Let the stops of known endings wait that are free; ``nodes [K]`` is filled in with their numbers."""
     add_endings(tree, known.endings, nodes, vehicle, scene)
@@ -151,7 +152,7 @@ def begin_outward(
         if nodes[k] >= 0:
             mark_place(tree, nodes[k], known.origin, vehicle)
             state = load(tree.states, nodes[k], vehicle)
-            left = _seconds_from_start(state, known, settings, vehicle)
+            left = _seconds_left(state, known, settings, vehicle)
             estimate = KNOWN * tree.seconds[nodes[k]] + settings.greed * left
             _let_wait(tree, nodes[k], state, estimate, 1, settings, vehicle)
 
@@ -162,7 +163,7 @@ def open_node(
     other: PoseTree,
     node: int,
     further: bool,
-    known: FromStart,
+    known: OtherEnd,
     settings: Outward,
     outgoing: Vehicle,
     vehicle: Vehicle,
@@ -199,7 +200,9 @@ def open_node(
                 ended = free < stride_m
                 if ended or metres >= settings.marks[mark] * STRIDE * size - 1e-9:
                     mark += 1
-                    if metres - before >= 2.0 * stride_m / FINE and not (ended and vehicle.min_speed > 0.0):
+                    if metres - before >= 2.0 * stride_m / FINE_LOOKS and not (
+                        ended and vehicle.min_speed > 0.0
+                    ):
                         longest = mark == len(settings.marks) and not ended
                         way = gear * metres
                         _wait(
@@ -219,7 +222,7 @@ def _wait(
     bend: float,
     metres: float,
     longest: bool,
-    known: FromStart,
+    known: OtherEnd,
     settings: Outward,
     outgoing: Vehicle,
     vehicle: Vehicle,
@@ -230,7 +233,7 @@ def _wait(
     ):
         return
     seconds, extra = seconds_after(tree, node, bend, metres, outgoing, vehicle)
-    left = _seconds_from_start(state, known, settings, vehicle)
+    left = _seconds_left(state, known, settings, vehicle)
     estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds, extra)
     if len(state) > FIRST_HITCH:  # decided when compiling
@@ -246,7 +249,7 @@ def grow_outward(
     tree: PoseTree,
     other: PoseTree,
     most: int,
-    known: FromStart,
+    known: OtherEnd,
     goal: Floats,
     drive: Drive,
     settings: Outward,
@@ -273,8 +276,8 @@ def grow_outward(
         key = cell_of(state, tree.metres[node], tree, cell, settings.headings, vehicle)
         if was_reached(tree.frontier, key):
             continue
-        least = tree.seconds[node] + tree.extras[node] + _least_seconds_from_start(state, known, vehicle)
-        if least >= slowest_kept(drive.ways):
+        least = tree.seconds[node] + tree.extras[node] + _least_seconds_left(state, known, vehicle)
+        if least >= dearest_kept(drive.ways):
             continue  # no way over it is worth driving
         reach(tree.frontier, key)
         expansions += 1
@@ -283,12 +286,12 @@ def grow_outward(
         if len(state) > FIRST_HITCH:  # decided when compiling
             near = node_near(other, state, known.origin, vehicle)
             if near >= 0:
-                last, first = (near, node) if known.outward else (node, near)
-                before, after = (other, tree) if known.outward else (tree, other)
+                last, first = (near, node) if known.from_goal else (node, near)
+                before, after = (other, tree) if known.from_goal else (tree, other)
                 if meet(before, last, after, first, known.endings, goal, drive, vehicle, scene):
                     return True, expansions
                 note_near(drive.near, before, last, after, first, vehicle)
-            if known.outward and shoot_with_trailers(other, tree, node, known, goal, drive, vehicle, scene):
+            if known.from_goal and shoot_with_trailers(other, tree, node, known, goal, drive, vehicle, scene):
                 return True, expansions
         elif shoot_between(tree, node, other, known, goal, drive, vehicle, scene):
             return True, expansions
@@ -303,8 +306,8 @@ def grow_trees(
     most: int,
     both: bool,
     needs_both: bool,
-    known: FromStart,
-    known_there: FromStart,
+    known: OtherEnd,
+    known_there: OtherEnd,
     goal: Floats,
     drive: Drive,
     settings: Outward,
@@ -323,8 +326,8 @@ def grow_trees(
         most: expansions of both.
         both: whether both grow.
         needs_both: whether to end where the other cannot grow.
-        known: what leads on from the tree to the other end.
-        known_there: what leads on from the other tree.
+        known: what the tree knows of the other end.
+        known_there: what the other tree knows of the end of this one.
         goal: that of ``goal_of``.
         drive: buffers.
         settings: how they grow.
@@ -340,7 +343,7 @@ def grow_trees(
     found = ended = False
     used = 0
     while used < most and not found and not ended:
-        share = min(TURN, most - used)
+        share = min(EXPANSIONS_A_TURN, most - used)
         began = used
         if both:
             found, used_there = grow_outward(

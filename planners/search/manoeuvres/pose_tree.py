@@ -1,4 +1,4 @@
-"""The tree of ways out of a goal pose, which are ways into it with time reversed."""
+"""The tree of ways out of a root: the start, or a goal pose, into which they lead with time reversed."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ SIZE, CHECKS, LAST = range(3)
 
 
 class PoseTree(NamedTuple):
-    """Poses at rest, each joined by an arc to the one that it was reached from; the first is the goal."""
+    """Poses at rest, each joined by an arc to the one that it was reached from; the first is the root."""
 
     states: Floats  # [NODES, S]
     parents: Indices  # [NODES]
     bends: Floats  # [NODES] of the arc between a node and its parent
-    metres: Floats  # [NODES] and its length; negative if it leads backwards out, so forwards in
+    metres: Floats  # [NODES] and its length; negative if it leads backwards out of the root
     runs: Floats  # [NODES] metres that are driven in the gear of that arc until it changes
-    seconds: Floats  # [NODES] estimated driving time from the node to the goal
+    seconds: Floats  # [NODES] estimated driving time between the node and the root
     extras: Floats  # [NODES] what that drive costs beside its time, in seconds
     known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
     places: Integers  # [PLACES] a node in the place that falls into this slot; -1: none
@@ -134,7 +134,7 @@ def seconds_of_run(metres: float, top: float, vehicle: Vehicle) -> float:
 def seconds_after(
     tree: PoseTree, node: int, bend: float, metres: float, outgoing: Vehicle, vehicle: Vehicle
 ) -> tuple[float, float]:
-    """The time to the goal from the end of an arc out of a node, and what it costs beside that, in seconds.
+    """The time between the root and the end of an arc out of a node, and what it costs beside, in seconds.
 
     ``metres`` and ``outgoing`` are as in the tree: the vehicle as it drives out of the root.
     """

@@ -31,19 +31,19 @@ from planners.world.vehicles.vehicle import Vehicle
 
 OUTLINES: Final = 12  # words of a shot that are glanced at
 CLOSED: Final = 2  # and corrected, where there are trailers
-NEAR: Final = 0.3  # radians: hitches that are farther off than this are not corrected
+MOST_OFF: Final = 0.3  # radians: hitches that are farther off than this are not corrected
 
 
-class FromStart(NamedTuple):
-    """What is known of the way from the start; of a tree that grows out of the start, from the goal."""
+class OtherEnd(NamedTuple):
+    """What a tree knows of the end that it grows towards: the start, or for one out of the start the goal."""
 
-    start: Floats  # [1, S]
-    go: CostToGo  # around obstacles
+    root: Floats  # [1, S] the state there, out of which the other tree grows
+    go: CostToGo  # the way there around obstacles
     table: Floats  # that of ``seconds_to_pose``
     endings: Endings  # of known plans
     radius: float  # of words, in metres, with which trailers keep straight enough
     origin: Floats  # [2] metres, from which places are counted
-    outward: bool  # whether the tree grows out of the goal
+    from_goal: bool  # whether the tree grows out of the goal, so towards the start
 
 
 @lean
@@ -80,7 +80,7 @@ def _shoot_alone(
     last: int,
     tree: PoseTree,
     node: int,
-    known: FromStart,
+    known: OtherEnd,
     goal: Floats,
     drive: Drive,
     vehicle: Vehicle,
@@ -117,7 +117,7 @@ def shoot_with_trailers(
     before: PoseTree,
     tree: PoseTree,
     node: int,
-    known: FromStart,
+    known: OtherEnd,
     goal: Floats,
     drive: Drive,
     vehicle: Vehicle,
@@ -125,9 +125,9 @@ def shoot_with_trailers(
 ) -> bool:
     """Try words from the start to a node, corrected so that the trailers stand as they do there."""
     c = drive.connection
-    x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+    x, y, heading = known.root[0, 0], known.root[0, 1], known.root[0, 2]
     there = (tree.states[node, 0], tree.states[node, 1], tree.states[node, 2])
-    if known.start[0, 3] != 0.0 and not vehicle.first_order:
+    if known.root[0, 3] != 0.0 and not vehicle.first_order:
         return False
     radius = known.radius
     count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
@@ -147,12 +147,12 @@ def shoot_with_trailers(
         if not outline_is_free(c.words[word], radius, x, y, heading, vehicle, scene):
             continue
         take_word(drive.join, c.words[word], radius, vehicle)
-        if trailers_are_off(known.start, drive.join, NEAR, vehicle):
+        if trailers_are_off(known.root, drive.join, MOST_OFF, vehicle):
             continue
         closed += 1
-        if not close(known.start, drive.join, vehicle):
+        if not close(known.root, drive.join, vehicle):
             continue
-        free, checks = arcs_are_free(known.start, drive.join, vehicle, scene)
+        free, checks = arcs_are_free(known.root, drive.join, vehicle, scene)
         tree.counts[CHECKS] += checks
         if free and drive_arcs_to_goal(drive, before, 0, tree, node, known.endings, goal, vehicle, scene):
             return True
@@ -164,16 +164,16 @@ def shoot_between(
     tree: PoseTree,
     node: int,
     other: PoseTree,
-    known: FromStart,
+    known: OtherEnd,
     goal: Floats,
     drive: Drive,
     vehicle: Vehicle,
     scene: Scene,
 ) -> bool:
     """Shoot between a node of one tree and the other tree: its root, and the node that it opened last."""
-    before, after = (other, tree) if known.outward else (tree, other)
+    before, after = (other, tree) if known.from_goal else (tree, other)
     for opened in (0, other.counts[LAST]):
-        last, first = (opened, node) if known.outward else (node, opened)
+        last, first = (opened, node) if known.from_goal else (node, opened)
         if _shoot_alone(before, last, after, first, known, goal, drive, vehicle, scene):
             return True
         if other.counts[LAST] == 0:

@@ -27,11 +27,11 @@ MOST_LEGS: Final = 512
 class Ways(NamedTuple):
     """The drives that a search has found, one of a kind."""
 
-    seconds: Floats  # [KEPT] what they cost, by an estimate; infinite: none
+    costs: Floats  # [KEPT] by an estimate, in seconds; infinite: none
     kinds: Indices  # [KEPT]
     legs: Floats  # [MOST_LEGS, 2] scratch: gear (1 or -1), by how many radians it turns
     counts: Indices  # [1] how many legs there are
-    last_seconds: Floats  # [1] of the last way that was looked at
+    last_cost: Floats  # [1] of the way that was looked at last
     last_kind: Indices  # [1]
 
 
@@ -49,15 +49,15 @@ def allocate_ways() -> Ways:
 
 def forget_ways(ways: Ways) -> None:
     """Nothing is found yet."""
-    ways.seconds.fill(np.inf)
+    ways.costs.fill(np.inf)
     ways.kinds.fill(-1)
 
 
 def keep_last(ways: Ways) -> int:
     """Keep the way that was looked at last; returns in which of the ``KEPT`` places."""
     same = np.flatnonzero(ways.kinds == ways.last_kind[0])
-    at = int(same[0]) if len(same) else int(np.argmax(ways.seconds))
-    ways.seconds[at], ways.kinds[at] = ways.last_seconds[0], ways.last_kind[0]
+    at = int(same[0]) if len(same) else int(np.argmax(ways.costs))
+    ways.costs[at], ways.kinds[at] = ways.last_cost[0], ways.last_kind[0]
     return at
 
 
@@ -123,11 +123,11 @@ def _run(metres: float, gear: float, vehicle: Vehicle) -> float:
 
 
 @inlined
-def _joined_seconds(
-    tree: PoseTree, node: int, metres: float, gear: float, seconds: float, vehicle: Vehicle
+def _joined_cost(
+    tree: PoseTree, node: int, metres: float, gear: float, cost: float, vehicle: Vehicle
 ) -> float:
-    """What a way costs that comes to a node of a goal tree for ``seconds``, its last run ``metres`` long."""
-    whole = seconds + tree.seconds[node] + tree.extras[node]
+    """What a way costs that comes to a node of a goal tree at a ``cost``, its last run ``metres`` long."""
+    whole = cost + tree.seconds[node] + tree.extras[node]
     if node > 0 and gear * tree.metres[node] > 0.0:
         whole += vehicle.costs.gear_change
     if node > 0 and gear * tree.metres[node] < 0.0:  # it drives on without a stop
@@ -137,30 +137,30 @@ def _joined_seconds(
 
 
 @inlined
-def slowest_kept(ways: Ways) -> float:
-    """The seconds below which a way is worth a look at its legs; infinite while a kind is missing."""
+def dearest_kept(ways: Ways) -> float:
+    """The cost below which a way is worth a look at its legs; infinite while a kind is missing."""
     worst = 0.0
     for k in range(KEPT):
-        worst = max(worst, ways.seconds[k])
+        worst = max(worst, ways.costs[k])
     return float(worst)
 
 
 @inlined
-def _is_worth(ways: Ways, seconds: float) -> bool:
-    """Whether a quick way, its legs in ``ways.legs``, is of a new kind, or the quickest of its kind."""
+def _is_worth(ways: Ways, cost: float) -> bool:
+    """Whether a cheap way, its legs in ``ways.legs``, is of a new kind, or the cheapest of its kind."""
     kind = _kind(ways)
     ways.last_kind[0] = kind
-    ways.last_seconds[0] = seconds
+    ways.last_cost[0] = cost
     for k in range(KEPT):
         if ways.kinds[k] == kind:
-            return bool(seconds < ways.seconds[k])
+            return bool(cost < ways.costs[k])
     return True
 
 
 def last_is_worth(ways: Ways) -> bool:
-    """Whether the way that was looked at last is worth keeping, now that its time is known."""
-    same = ways.seconds[ways.kinds == ways.last_kind[0]]
-    return bool(ways.last_seconds[0] < (same.min() if len(same) else ways.seconds.max()))
+    """Whether the way that was looked at last is worth keeping, now that its cost is known."""
+    same = ways.costs[ways.kinds == ways.last_kind[0]]
+    return bool(ways.last_cost[0] < (same.min() if len(same) else ways.costs.max()))
 
 
 @lean
@@ -180,25 +180,25 @@ def word_is_worth(
     """
     metres = before.runs[last]
     gear = _gear_to(before, last)
-    seconds = before.seconds[last] + before.extras[last] - _run(metres, gear, vehicle)
+    cost = before.seconds[last] + before.extras[last] - _run(metres, gear, vehicle)
     for k in range(PARTS):
         part = radius * word[PARTS + k]
         if part == 0.0:
             continue
         if gear * part < 0.0:
-            seconds += _run(metres, gear, vehicle) + vehicle.costs.gear_change
+            cost += _run(metres, gear, vehicle) + vehicle.costs.gear_change
             metres = 0.0
         gear = gear_of(part)
         metres += abs(part)
-    seconds += _run(metres, gear, vehicle)
-    seconds = _joined_seconds(tree, node, metres, gear, seconds, vehicle)
-    if seconds >= slowest_kept(ways):
+    cost += _run(metres, gear, vehicle)
+    cost = _joined_cost(tree, node, metres, gear, cost, vehicle)
+    if cost >= dearest_kept(ways):
         return False
     _list_legs_from_root(ways, before, last)
     for k in range(PARTS):
         _add_leg(ways, radius * word[PARTS + k], word[k] * word[PARTS + k])
     _add_legs_to_root(ways, tree, node, -1.0)
-    return _is_worth(ways, seconds)
+    return _is_worth(ways, cost)
 
 
 @lean
@@ -207,14 +207,14 @@ def meeting_is_worth(
 ) -> bool:
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
     gear = _gear_to(before, last)
-    seconds = _joined_seconds(
+    cost = _joined_cost(
         tree, node, before.runs[last], gear, before.seconds[last] + before.extras[last], vehicle
     )
-    if seconds >= slowest_kept(ways):
+    if cost >= dearest_kept(ways):
         return False
     _list_legs_from_root(ways, before, last)
     _add_legs_to_root(ways, tree, node, -1.0)
-    return _is_worth(ways, seconds)
+    return _is_worth(ways, cost)
 
 
 @lean

@@ -37,7 +37,7 @@ def test_what_was_asked_before_changes_no_answer(planner: str) -> None:
 def test_searches_long_ago_change_no_answer() -> None:
     used = Workspace()
     frontiers = [
-        used.buffers(allocate_trees, state_size(CAR), 0)[0].frontier,
+        used.buffers(allocate_trees, state_size(CAR))[0].frontier,
         used.buffers(allocate_frontier),
     ]
     for problem in [*SLOTS, *STREWN]:

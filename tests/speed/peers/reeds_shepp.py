@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from ompl import base, geometric, util
 
 from planners.search.connection.connection import radius_at
-from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
+from planners.search.manoeuvres.arcs import FINE_LOOKS, at_pace, stride_of
 from planners.world.geometry.collision import scene_of, state_is_free
 from planners.world.jit import jit
 from planners.world.problem import Plan, Problem
@@ -37,7 +37,7 @@ class Found(NamedTuple):
 @jit
 def _is_free(x: float, y: float, heading: float, vehicle: Car, scene: Any) -> bool:
     """Whether a pose is free, with room for all within a step of it that is checked when it is driven."""
-    speed = (_STEP_M + stride_of(1.0, vehicle) / FINE) / vehicle.dt
+    speed = (_STEP_M + stride_of(1.0, vehicle) / FINE_LOOKS) / vehicle.dt
     for turn in (-1.0, 1.0):
         bend = turn * tightest_bend(turning_speed(vehicle), vehicle)
         if not state_is_free(at_pace((x, y, heading, 0.0, 0.0), speed, bend, vehicle), vehicle, scene):

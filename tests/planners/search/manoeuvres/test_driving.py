@@ -12,7 +12,7 @@ from planners.search.manoeuvres.driving import allocate_drive, begin, drive_arc,
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.outward import Outward, open_node
 from planners.search.manoeuvres.pose_tree import SIZE, allocate_pose_tree, plant_root, pose_of
-from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.shots import OtherEnd
 from planners.search.manoeuvres.variants import word_radius
 from planners.search.query import Limits
 from planners.search.registry import plan
@@ -41,7 +41,7 @@ def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
         scene, goal = scene_of(problem), goal_of(problem, CAR)
         occupied = drawing_of(problem, Workspace()).occupied
         fill_cost_to_go(occupied, *problem.start[:2], 0.1, window_of(problem), go)
-        known = FromStart(
+        known = OtherEnd(
             *(start_state(problem)[np.newaxis], go, seconds_to_pose(CAR), no_endings(size)),
             *(word_radius(CAR), goal[:2], True),
         )

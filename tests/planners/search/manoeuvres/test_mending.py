@@ -43,7 +43,7 @@ def turned_round(problem: Problem, expansions: int, workspace: Workspace) -> Out
 
 @pytest.fixture
 def unmended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mending, "TRIES", 0)
+    monkeypatch.setattr(mending, "WAYS_AT_A_TIME", 0)
 
 
 @pytest.mark.parametrize("number", HARD)
@@ -67,10 +67,10 @@ def trees() -> tuple[Problem, PoseTree, PoseTree, Drive]:
     """A problem, the trees out of its goal and out of its start, and where they all but met."""
     problem, used = yard(17), Workspace()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mending, "TRIES", 0)
+        patch.setattr(mending, "WAYS_AT_A_TIME", 0)
         turned_round(problem, 1500, used)
     size = state_size(TRAIN)
-    return problem, *used.buffers(allocate_trees, size, 0), used.buffers(allocate_drive, size)
+    return problem, *used.buffers(allocate_trees, size), used.buffers(allocate_drive, size)
 
 
 def test_ways_lead_from_start_to_goal_with_one_gap(trees: tuple[Problem, PoseTree, PoseTree, Drive]) -> None:
@@ -104,7 +104,7 @@ def test_ways_lead_from_start_to_goal_with_one_gap(trees: tuple[Problem, PoseTre
 )
 def test_where_hitches_differ_least_is_remembered(places: list[tuple[float, float, float]]) -> None:
     size = state_size(TRAIN)
-    before, tree = allocate_trees(size, 0)
+    before, tree = allocate_trees(size)
     near = allocate_near_meetings()
     for k, (x, y, off) in enumerate(places):
         before.states[k] = (x, y, 0.0, 0.0, 0.0, off)

@@ -65,14 +65,14 @@ def test_a_gap_is_closed_to_who_is_wider(gap: float) -> None:
 def test_what_one_search_closes_stays_open_to_others() -> None:
     query = Query(LOT, generator(1), scene_of(LOT), Workspace(), vehicle=ROBOT)
     search = Manoeuvring(query, goal_of(LOT, ROBOT), drawing_of(LOT).occupied)
-    at_first = search._known.go.costs.copy()
+    at_first = search._start_end.go.costs.copy()
     search._close_narrow_ways()
-    closed = search._known.go.costs.copy()
+    closed = search._start_end.go.costs.copy()
     slimmer = search.of_slimmer(query, 0.2)
-    assert np.array_equal(slimmer._known.go.costs, at_first)
+    assert np.array_equal(slimmer._start_end.go.costs, at_first)
     slimmer._close_narrow_ways()
-    assert np.array_equal(search._known.go.costs, closed)
-    assert not np.array_equal(slimmer._known.go.costs, closed)
+    assert np.array_equal(search._start_end.go.costs, closed)
+    assert not np.array_equal(slimmer._start_end.go.costs, closed)
 
 
 def test_a_gap_too_narrow_for_the_robot_does_not_hold_the_search_up() -> None:

@@ -230,12 +230,12 @@ def test_one_way_of_each_kind_is_kept_and_the_slowest_gives_way() -> None:
     ways, best = allocate_ways(), dict[int, float]()
     forget_ways(ways)
     for kind, seconds in [(1, 9.0), (2, 8.0), (1, 7.0), (3, 6.0), (4, 5.0), (4, 4.0)]:
-        if seconds < ways.seconds.max() or kind in ways.kinds:
-            ways.last_kind[0], ways.last_seconds[0] = kind, seconds
+        if seconds < ways.costs.max() or kind in ways.kinds:
+            ways.last_kind[0], ways.last_cost[0] = kind, seconds
             keep_last(ways)
         best[kind] = min(seconds, best.get(kind, seconds))
     assert len(set(ways.kinds)) == KEPT
-    assert sorted(ways.seconds) == sorted(best.values())[:KEPT]
+    assert sorted(ways.costs) == sorted(best.values())[:KEPT]
 
 
 def test_beside_a_drive_a_search_goes_on_for_as_long_as_a_quicker_one_is_worth() -> None:
@@ -246,6 +246,6 @@ def test_beside_a_drive_a_search_goes_on_for_as_long_as_a_quicker_one_is_worth()
         assert alone.plan is not None
         for below_s in (2.0, 6.0, alone.plan.duration_s):
             found, _ = search_and_polish("lattice", query, 0, below_s=below_s)
-            assert found.expansions <= manoeuvring.PER_SQUARE_SECOND * below_s**2 + outward.TURN
+            assert found.expansions <= manoeuvring.PER_SQUARE_SECOND * below_s**2 + outward.EXPANSIONS_A_TURN
             least += found.expansions < alone.expansions
     assert least > 6
