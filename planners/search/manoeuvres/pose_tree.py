@@ -194,24 +194,47 @@ def add_known_node(
 
 
 @inlined
+def _square_of(state: State, x: float, y: float, side: float) -> int:
+    """The square of a position, seen from (x, y): in 32 bits its row and, in the lower 16, its column."""
+    row = math.floor((state[1] - y) / side) & 0xFFFF
+    column = math.floor((state[0] - x) / side) & 0xFFFF
+    return int(row << 16 | column)
+
+
+@inlined
+def _sector_of(state: State, headings: int) -> int:
+    """Which of so many ``headings`` a state has; by rounding it may be one more than the last."""
+    return int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi)))
+
+
+@inlined
+def _slot_of(key: int, slots: int) -> int:
+    """Which of the slots, a power of two of them, a key falls into: bits from the middle of a product."""
+    return (key * _FIBONACCI >> 20) & (slots - 1)
+
+
+@inlined
 def cell_of(state: State, gear: float, tree: PoseTree, cell: float, headings: int, vehicle: Vehicle) -> int:
-    """The cell of a pose that is left in a gear, seen from the goal; with its hitches."""
-    row = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
-    column = math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF
-    heading = int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi))) % MOST_HEADINGS
-    key = 0
+    """The cell of a pose that is left in a gear, seen from the root; with its hitches.
+
+    Its bits are, from the highest: 5 for each hitch, 32 for the square, 10 for the heading, 1 for the gear.
+    """
+    hitches = 0
     for k in range(FIRST_HITCH, len(state)):
-        key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
-    return int(((key << 16 | row) << 16 | column) << 11 | heading << 1 | (1 if gear > 0.0 else 0))
+        hitches = hitches << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
+    square = _square_of(state, tree.states[0, 0], tree.states[0, 1], cell)
+    heading = _sector_of(state, headings) % MOST_HEADINGS
+    return int((hitches << 32 | square) << 11 | heading << 1 | (1 if gear > 0.0 else 0))
 
 
 @inlined
 def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
-    """The place of a pose with its hitches, seen from a corner ``origin [2]``: where two trees may meet."""
-    cell = PLACE * (vehicle.front + vehicle.rear)
-    key = math.floor((state[1] - origin[1]) / cell) & 0xFFFF
-    key = key << 16 | (math.floor((state[0] - origin[0]) / cell) & 0xFFFF)
-    key = key << 7 | int((wrapped(state[2]) + math.pi) * (PLACE_HEADINGS / (2.0 * math.pi)))
+    """The place of a pose with its hitches, seen from a corner ``origin [2]``: where two trees may meet.
+
+    Its bits are, from the highest: 32 for the square, 7 for the heading, 5 for each hitch.
+    """
+    square = _square_of(state, origin[0], origin[1], PLACE * (vehicle.front + vehicle.rear))
+    key = square << 7 | _sector_of(state, PLACE_HEADINGS)
     for k in range(FIRST_HITCH, len(state)):
         key = key << 5 | (math.floor(state[k] * PLACE_HITCHES) & 31)
     return int(key)
@@ -219,27 +242,23 @@ def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
 
 @inlined
 def region_of(state: State, tree: PoseTree, vehicle: Vehicle) -> int:
-    """The slot in ``opened`` of a region: a length, an eighth of all headings, a radian of each hitch."""
-    cell = REGION * (vehicle.front + vehicle.rear)
-    key = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
-    key = key << 16 | (math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF)
-    key = key << 4 | int((wrapped(state[2]) + math.pi) * (REGION_HEADINGS / (2.0 * math.pi)))
+    """The slot in ``opened`` of a region: a length, an eighth of all headings, a radian of each hitch.
+
+    The bits of its key are, from the highest: 32 for the square, 4 for the heading, 3 for each hitch.
+    """
+    side = REGION * (vehicle.front + vehicle.rear)
+    square = _square_of(state, tree.states[0, 0], tree.states[0, 1], side)
+    key = square << 4 | _sector_of(state, REGION_HEADINGS)
     for k in range(FIRST_HITCH, len(state)):
         key = key << 3 | (math.floor(state[k] + 0.5) & 7)
-    return int((key * _FIBONACCI >> 20) & (REGIONS - 1))
-
-
-@inlined
-def slot_of(place: int) -> int:
-    """Where in ``places`` a place has its node."""
-    return (place * _FIBONACCI >> 20) & (PLACES - 1)
+    return _slot_of(key, REGIONS)
 
 
 @inlined
 def mark_place(tree: PoseTree, node: int, origin: Floats, vehicle: Vehicle) -> None:
     """Remember a node for its place, unless there is one."""
     place = place_of(load(tree.states, node, vehicle), origin, vehicle)
-    slot = slot_of(place)
+    slot = _slot_of(place, PLACES)
     known = tree.places[slot]
     if known < 0 or place_of(load(tree.states, known, vehicle), origin, vehicle) != place:
         tree.places[slot] = node
@@ -249,7 +268,7 @@ def mark_place(tree: PoseTree, node: int, origin: Floats, vehicle: Vehicle) -> N
 def node_near(tree: PoseTree, state: State, origin: Floats, vehicle: Vehicle) -> int:
     """A node in the place of a state; -1 if none is known."""
     place = place_of(state, origin, vehicle)
-    node = tree.places[slot_of(place)]
+    node = tree.places[_slot_of(place, PLACES)]
     if node >= 0 and place_of(load(tree.states, node, vehicle), origin, vehicle) == place:
         return int(node)
     return -1
