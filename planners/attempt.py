@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Final
 
-if TYPE_CHECKING:  # its import takes half a second, and who reads rows needs only the names
+if TYPE_CHECKING:  # its import takes half a second, and reading rows needs only the names
     from planners.world.problem import Plan
 
 WITHOUT_MEMORY = ("none", "fresh")  # the assists whose top k is 0

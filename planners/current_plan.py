@@ -26,7 +26,7 @@ from planners.world.workspace import Workspace
 
 OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and shares of full speed together
 ROUNDING: Final = 1e-9  # on limits, m/s and radians
-SAME: Final = 1e-6  # metres, m/s and radians: who is off by no more drives the same controls on
+SAME: Final = 1e-6  # metres, m/s and radians: a robot that is off by no more drives the same controls on
 
 
 def rest_of(

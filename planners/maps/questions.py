@@ -18,7 +18,7 @@ from planners.world.vehicles.vehicle import CAR, FIRST_HITCH, Vehicle, state_siz
 DISTANCES_M: Final = (2.0, 70.0)  # from start to goal
 STEERED: Final = 0.5  # share of the largest steering angle or turn rate, at most, at the start
 BENT: Final = 0.3  # radians, at most, of each hitch at the start
-BRAKING_STEPS: Final = 10_000  # whoever needs more to stand is too fast anywhere
+BRAKING_STEPS: Final = 10_000  # what needs more to stand is too fast anywhere
 TRIES: Final = 1_000  # draws until a world is given up
 
 

@@ -225,7 +225,7 @@ def _heading(problem: Problem) -> float:
 def _asked(
     states: Floats, drawn: Problem | None, question: str, canonical: bool, vehicle: Vehicle
 ) -> Problem:
-    """What is asked of who begins like these states: the goal drawn, or to end as they do on open ground."""
+    """The question that begins like these states: the goal drawn, or to end as they do on open ground."""
     start = (float(states[0, 0]), float(states[0, 1]), float(states[0, 2]))
     motion = tuple(states[0, 3:].tolist())
     if drawn is not None:

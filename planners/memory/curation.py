@@ -39,7 +39,7 @@ def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR)
     Args:
         candidates: solved problems with plans.
         count: how many to keep.
-        vehicle: who drives.
+        vehicle: what is driven.
 
     Returns:
         The numbers ``[count]`` of the candidates to keep, the most useful first; if there are no more

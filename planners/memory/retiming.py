@@ -3,7 +3,7 @@
 Each run between two changes of gear is driven as fast as the limits of speed, acceleration and steering rate
 allow, and where the wheels must turn at rest there is time for it. Trailers follow: where the vehicle drives
 backwards they are pulled along the run from its end, which is stable. The steps of the guess do not quite
-lead from state to state, most of all where two runs meet; whoever uses it closes these gaps.
+lead from state to state, most of all where two runs meet; whatever uses it closes these gaps.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
-ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
+ARRIVED_M: Final = 1e6  # a stop in the goal disc is so much better than any other
 POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
 BRIEFLY: Final = Limits(expansions=8_000)
 VERY_BRIEFLY: Final = Limits(expansions=3_000)  # into a door, where there mostly are others

@@ -23,7 +23,7 @@ NEAR_M: Final = 8.0  # of the drive: what else is occupied is not looked at by t
 APART: Final = 10  # steps between states whose surroundings count
 MOST_STEPS: Final = 10_000  # of a drive that is polished as a whole
 OF_TOLERANCES: Final = 0.99  # that plans may use
-NEAREST_M: Final = 0.1  # to a place: who may end so far from it may end anywhere within
+NEAREST_M: Final = 0.1  # of a place: its tolerance is not tightened below this
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def stricter(problem: Problem, end: Floats | None = None) -> Problem:
 
 
 def _only_near(problem: Problem, plan: Plan) -> Problem:
-    """The problem with the pieces of obstacles alone whose boxes are near the drive."""
+    """The problem with only those pieces of obstacles whose boxes are near the drive."""
     places = plan.states[[*range(0, len(plan.states), APART), -1], :2]
     near = [
         piece

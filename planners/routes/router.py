@@ -44,7 +44,7 @@ CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map
 WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that are tried next ...
 DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
 ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
-OF_OUTLINE: Final = 0.9  # of its width: who does not fill a box may get through what is narrower
+OF_OUTLINE: Final = 0.9  # of its width: with an outline a body may fit through gaps narrower than its box
 
 
 class Router:
@@ -190,14 +190,14 @@ class Router:
         """Why start or goals cannot be used, if so; arguments as of ``route``."""
         state = self._state(start, motion)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
-            who = self._blocked_body(state)
+            body = self._blocked_body(state)
             where = (
                 "in an obstacle or across the map's edge"
                 if self._world.holds(*start[:2])
                 else "outside the map"
             )
             free = free_nearby(state, self._vehicle, self._scene)
-            return Stuck(start[:2], f"{who} would stand {where}", 0, free=free)
+            return Stuck(start[:2], f"{body} would stand {where}", 0, free=free)
         for number, (stop, to_stop) in enumerate(
             zip(stops, self._problems(start, stops, motion), strict=True)
         ):
@@ -207,10 +207,10 @@ class Router:
                 return Stuck(stop.place, f"{goal} lies {where}", 0)
             if lacks_room(to_stop, self._vehicle, self._scene):
                 last = unfolded(to_stop, self._vehicle)
-                who = self._blocked_body(last)
+                body = self._blocked_body(last)
                 pose = f"the pose of {goal}" if len(stops) > 1 else "the goal pose"
                 free = None if last is None else free_nearby(last, self._vehicle, self._scene)
-                return Stuck(stop.place, f"{who} has no room in {pose}", 0, free=free)
+                return Stuck(stop.place, f"{body} has no room in {pose}", 0, free=free)
         return None
 
     def _begun(self, start: Pose, motion: tuple[float, ...]) -> Problem:
@@ -267,7 +267,7 @@ class Router:
         return None
 
     def _blocked_body(self, state: Floats | None) -> str:
-        """Who is not free in a state ``[S]``: the vehicle, or if that is free a trailer."""
+        """What is not free in a state ``[S]``: the vehicle, or if that is free a trailer."""
         bodies = body_count(self._vehicle)
         free = np.ones(bodies, bool)
         if state is not None:
@@ -282,5 +282,5 @@ def _goal_name(number: int, stops: Sequence[Stop]) -> str:
 
 
 def _disc_inside(body: Vehicle | Trailer) -> float:
-    """How wide a disc is that surely lies inside a body, metres; about as wide as what it gets through."""
+    """The width in metres of a disc that surely lies inside a body; it gets through gaps about as wide."""
     return min(body.width, body.front + body.rear) * (OF_OUTLINE if body.about.outline else 1.0)

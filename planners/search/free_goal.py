@@ -28,7 +28,7 @@ BEARINGS: Final = 16  # of these poses
 TURNED: Final = (0.0, 0.5, -0.5)  # shares of the tolerated angle by which they are turned
 STEP: Final = math.radians(1.0)  # between angles at which bodies are looked at for a proof
 SLACK_M: Final = 1e-6  # for roundings
-MOST_LOOKS: Final = 100_000  # at a body, some 15 ms; who would need more proves nothing
+MOST_LOOKS: Final = 100_000  # at a body, some 15 ms; what would need more is no proof
 
 
 def with_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> Problem:

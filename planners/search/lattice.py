@@ -54,11 +54,12 @@ class LatticeSettings(NamedTuple):
     sharpest: float = 0.65  # 1/m: no primitive bends more at full speed
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
-    full_speed_m: float = 4.0  # who gathers speed on a longer way has longer trials
+    full_speed_m: float = 4.0  # vehicles that need more metres to reach full speed get longer trials
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
-    moving: int = 1200  # expansions before who moves looks for manoeuvres from where it has stopped
+    # expansions before a moving vehicle also looks for manoeuvres from where it would have stopped
+    moving: int = 1200
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
@@ -208,7 +209,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     def is_enclosed() -> bool:
         """Whether squeezing was in vain, too, and no known ending may lead to the goal.
 
-        Who looks for something better knows a drive there.
+        A search for something better knows a drive there.
         """
         if improving or manoeuvring is None or may_squeeze or not (joining is None or joining.is_over):
             return False
@@ -263,7 +264,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
 
 
 def _restart_after(query: Query, settings: LatticeSettings) -> int:
-    """Expansions of a trial: more for who brakes for bends or gathers speed slowly: ways have more states."""
+    """Expansions of a trial: more if a vehicle brakes for bends or gathers speed slowly, over more states."""
     top = query.vehicle.max_speed
     slower = top / turning_speed(query.vehicle)
     longer = 0.5 * top * top / (control_limits(query.vehicle)[0] * settings.full_speed_m)

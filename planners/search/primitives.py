@@ -83,7 +83,7 @@ def controls_of(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -
     turn = min(max(lattice.turn * side, -1.0), 1.0) * turn_limit(vehicle)
     limit_1, limit_2 = control_limits(vehicle)
     control_1 = min(max((speed - state[3]) / vehicle.dt, -limit_1), limit_1)
-    if vehicle.max_lateral_acceleration < math.inf and abs(side) < 1.0:  # only who turns fully brakes for it
+    if vehicle.max_lateral_acceleration < math.inf and abs(side) < 1.0:  # only full turns are braked for
         sharpest = turn_limit_at(state[3] + vehicle.dt * control_1, vehicle)
         turn *= min(sharpest / (GRIPPING * turn_limit(vehicle)), 1.0)
     control_2 = min(max((turn - state[4]) / vehicle.dt, -limit_2), limit_2)
@@ -208,11 +208,11 @@ def grow_lattice(
 def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
     """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
 
-    Who turns in wide circles drives on until it has left its cell of heading, if that is not too far: else
-    turning and driving straight on end in one cell, and only one of them counts. Speeds are told apart
-    more finely if two primitives one after another would not get from one to the next. Who turns on the spot
-    would turn round in each primitive: at full speed none bends more than ``sharpest`` (1/m). Where lateral
-    acceleration is limited that does so already.
+    A vehicle that turns in wide circles drives on until it has left its cell of heading, if that is not too
+    far: else turning and driving straight on end in one cell, and only one of them counts. Speeds are told
+    apart more finely if two primitives one after another would not get from one to the next. A vehicle that
+    turns on the spot would turn round in each primitive: at full speed none bends more than ``sharpest``
+    (1/m). Where lateral acceleration is limited that does so already.
     """
     top = vehicle.max_speed
     unlimited = vehicle._replace(max_lateral_acceleration=math.inf)
@@ -233,6 +233,6 @@ def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
 
 
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
-    """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
+    """Another lattice, drawn at random: a search for a better plan than before must look at other states."""
     steps = max(lattice.steps + int(3.0 * query.rng.random()) - 1, 1)
     return lattice._replace(greed=greed, steps=steps, turn=lattice.turn * (0.7 + 0.6 * query.rng.random()))

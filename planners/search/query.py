@@ -58,7 +58,8 @@ class Limits:
     seconds: float = 30.0
     bound_s: float = math.inf  # only plans that cost less than this count as solutions
     further: int = 0  # expansions at least for drives of other kinds after a first to a pose
-    second: bool = True  # whether another planner may be asked as well (``search_and_polish``)
+    # whether another planner, or a way by the place of a pose, may be tried as well (``search_and_polish``)
+    second: bool = True
 
 
 def usual_limits(problem: Problem, seconds: float | None = None) -> Limits:

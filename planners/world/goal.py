@@ -20,7 +20,7 @@ SLACK: Final = 1e-9  # m/s, rad/s and radians: what sums of controls round away
 
 
 def place(x: float, y: float, radius: float) -> Floats:
-    """Make the goal ``[8]`` of whoever is to get into a disc (metres), with any heading and motion."""
+    """Make the goal ``[8]`` of getting into a disc (metres), with any heading and motion."""
     return np.array([x, y, radius, 0.0, math.inf, -math.inf, math.inf, math.inf])
 
 
@@ -79,5 +79,5 @@ def asks_for_more(goal: Floats) -> bool:
 
 
 def goal_of_pose(x: float, y: float, heading: float) -> Floats:
-    """Make the goal ``[8]`` of whoever is to stand at a pose (metres, radians), with the usual tolerances."""
+    """Make the goal ``[8]`` of standing at a pose (metres, radians), with the usual tolerances."""
     return np.array([x, y, POSE_RADIUS, heading, POSE_TOLERANCE, -SLACK, SLACK, math.inf])

@@ -56,7 +56,7 @@ def list_stretches(
         ground: between there and the goal.
         listed: ``[LISTED]``, filled in with the best one first; of mirrored ones -1 - number.
         estimates: ``[LISTED]``, filled in with their estimates.
-        vehicle: who drives.
+        vehicle: what is driven.
     """
     sin, cos = sincos(start[2])
     count = 0

@@ -87,7 +87,7 @@ def gathered_library(
 
     Args:
         class_name: of the questions.
-        vehicle: who drives.
+        vehicle: what is driven.
         answered: the id of each question, and its plan in any frame.
         scales: of the questions: real metres in one metre of a plan.
 

@@ -43,7 +43,7 @@ CHECKED, LOOKS = range(2)  # indices into Recalling.work
 
 
 class Cells(NamedTuple):
-    """The cells of a window that are not free. Who passes through one is mostly blocked."""
+    """The cells of a window that are not free. A vehicle that passes through one is mostly blocked."""
 
     occupied: Bits  # [64]
     window: Window

@@ -91,7 +91,7 @@ def _in_radii(start: Pose, end: Pose, radius: float) -> Pose:
     return dx * cos + dy * sin, dy * cos - dx * sin, wrapped(end[2] - start[2])
 
 
-PACES: Final = 7  # that who cannot reverse may choose from, each half as quick as the one before
+PACES: Final = 7  # that a vehicle that cannot reverse chooses from, each half as quick as the one before
 
 
 @lean
@@ -121,7 +121,7 @@ def list_connections(c: Connection, before: float, goal: Floats, top: float, veh
         c: buffers, the first state filled in.
         before: above 0 if the vehicle has driven forwards so far, below 0 if backwards, 0 if not at all.
         goal: that of ``goal_of``.
-        top: the largest speed in m/s. Who drives more slowly may turn more sharply.
+        top: the largest speed in m/s. At a smaller one a vehicle may turn more sharply.
         vehicle: what is driven.
 
     Returns:
@@ -142,8 +142,8 @@ def list_connections(c: Connection, before: float, goal: Floats, top: float, veh
 def best_pace(c: Connection, before: float, goal: Floats, top: float, vehicle: Vehicle) -> float:
     """The largest speed in arcs with which a goal is reached soonest: ``top``, or less.
 
-    Few words lead forwards alone. Who cannot reverse, but turns more sharply when he is slower, is there
-    sooner so than once round a wide circle. Arguments as of ``list_connections``.
+    Few words lead forwards alone. A vehicle that cannot reverse, but turns more sharply when it is slower, is
+    there sooner so than once round a wide circle. Arguments as of ``list_connections``.
     """
     if not chooses_pace(vehicle):
         return top

@@ -71,7 +71,7 @@ def last_speed(gear: float, first: float, metres: float, goal: Floats, accelerat
 def lead_of(state: State, top: float, vehicle: Vehicle) -> float:
     """How far a state drives, in metres, before it bends as the first part does, on average.
 
-    Who is too fast to bend so brakes first, who is slower gains speed.
+    A vehicle that is too fast to bend so brakes first, a slower one gains speed.
     """
     speed = abs(state[3])
     if speed == 0.0:
@@ -101,7 +101,7 @@ def radius_at(top: float, vehicle: Vehicle) -> float:
 
 @lean
 def chooses_pace(vehicle: Vehicle) -> bool:
-    """Whether arcs of words may be driven slowly: by who cannot reverse, and turns more sharply then."""
+    """Whether arcs of words may be driven slowly: by what cannot reverse, and turns more sharply then."""
     fastest = turning_speed(vehicle)
     return vehicle.min_speed == 0.0 and radius_at(0.5 * fastest, vehicle) < radius_at(fastest, vehicle)
 

@@ -147,9 +147,9 @@ def fill_limited(
 ) -> int:
     """Fill in the speeds of a run where each place has a limit of its own; the rest as ``fill_run``.
 
-    It leads about as far as asked: who asks corrects what is missing. ``limits [count + 1]`` in m/s are those
-    of places equally far from one another, the first and the last at the ends; they are lowered to what is
-    driven.
+    It leads about as far as asked: the caller corrects what is missing. ``limits [count + 1]`` in m/s are
+    those of places equally far from one another, the first and the last at the ends; they are lowered to what
+    is driven.
     """
     stride = metres / count
     limits[0] = first

@@ -36,7 +36,7 @@ def seconds_for(metres: float, turn: float, speed: float, vehicle: Vehicle) -> f
         metres: of the way.
         turn: 1 - cos of the angle to turn by before it goes straight ahead.
         speed: at the start, in m/s.
-        vehicle: who drives.
+        vehicle: what is driven.
     """
     missing = vehicle.max_speed - speed
     slow_s = missing * missing / (2.0 * control_limits(vehicle)[0] * vehicle.max_speed)
@@ -67,7 +67,7 @@ def is_detour(plan: Plan, planner: str, view: View, vehicle: Vehicle) -> bool:
         plan: the free plan.
         planner: one of ``PLANNERS``.
         view: the problem that the plan solves.
-        vehicle: who drives.
+        vehicle: what is driven.
     """
     if planner not in DETOURS:
         return False

@@ -1,4 +1,4 @@
-"""Whether nobody gets out of a goal pose, and so hardly anybody into it."""
+"""Whether no vehicle gets out of a goal pose, and so hardly any into it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planners.world.arrays import Bounds, Floats
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
 
-EXACT: Final = 0.1  # of a length, or radians: whoever may stand farther off may get where the pose does not
+EXACT: Final = 0.1  # of a length, or radians: with larger tolerances another pose may be reachable
 
 
 def is_closed(tree: PoseTree, goal: Floats, bounds: Bounds, vehicle: Vehicle) -> bool:
@@ -24,7 +24,7 @@ def is_closed(tree: PoseTree, goal: Floats, bounds: Bounds, vehicle: Vehicle) ->
         tree: the tree of ways out.
         goal: that of ``goal_of``.
         bounds: of the problem, metres.
-        vehicle: whoever is to get there.
+        vehicle: what is to get there.
     """
     size, trailers = int(tree.counts[SIZE]), trailers_of(vehicle)
     length = vehicle.front + vehicle.rear

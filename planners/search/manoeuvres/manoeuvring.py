@@ -48,15 +48,16 @@ MEETING: Final = 3  # with trailers a level gets so many times the expansions: t
 FIRST_MEETING: Final = 4000  # expansions of the first level then: with more greed drives get longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends, and that for tight goals
 STUCK: Final = 1000  # expansions where cells are fine, after which the search is stuck
-PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
+# expansions that looking for other drives is worth, for each square second of the quickest one known ...
+PER_SQUARE_SECOND: Final = 10
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
 PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
 MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
-DETOUR: Final = 1.35  # times as long as if nothing were in the way, or only cells: a drive may be one ...
+DETOUR: Final = 1.35  # times as long as with nothing or only cells in the way: such a drive may be one ...
 FROM_START: Final = 512  # ... and is worth so many expansions out of the start
 TURNS: Final = 8  # of both trees between two looks at the clock ...
 AMPLE_S: Final = 1.0  # ... if so many seconds are left; 1 otherwise
-AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
+AROUND_START_M: Final = 0.1  # so near to the start nothing counts as left of the way to it
 
 
 def allocate_trees(state_size: int) -> tuple[PoseTree, PoseTree]:
@@ -120,7 +121,7 @@ class Manoeuvring:
         self._may_loop = self._may_mend
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
-        # costs are not compared with it: who pays for more than time has a search by time alone as well
+        # costs are not compared with it: where more than time counts, another search counts time alone
         self.least_seconds = self._least_seconds() if counting_time(vehicle) == vehicle else math.inf
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
@@ -240,7 +241,7 @@ class Manoeuvring:
                 return
 
     def _worth(self, longest: int, least: int) -> int:
-        """How many expansions the quickest drive is worth that was found, if there is one."""
+        """How many expansions a search is worth for drives quicker than what was found; 0 if nothing was."""
         if not self.kept:
             return 0
         per = PER_SQUARE_SECOND_MEETING if self.meets else PER_SQUARE_SECOND
@@ -251,8 +252,9 @@ class Manoeuvring:
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
 
-        A level ends when it has had all its expansions, or nothing is left to open. Where only the start is
-        too narrow for it, too, but for the last. Before the first level trains try to turn round in a loop.
+        A level ends when it has had all its expansions, or nothing is left to open. Unless it is the last, it
+        also ends when the tree at the start has nothing left to open. Before the first level trains try to
+        turn round in a loop.
         """
         if self._loops(until):
             return True
@@ -281,9 +283,8 @@ class Manoeuvring:
         """From now on the way to the start avoids what is narrower than the vehicle, if it can."""
         if self.meets:
             return  # it was not tried with trailers
-        go = (
-            allocate_cost_to_go()
-        )  # not the buffers of others: searches of slimmer bodies begin with all ways
+        # buffers of its own, since searches of slimmer bodies begin with all ways
+        go = allocate_cost_to_go()
         narrow = too_narrow(self._scene, self._window, self._vehicle, self._query.workspace)
         x, y = self._query.problem.start[:2]
         fill_cost_to_go(self._occupied | narrow, x, y, AROUND_START_M, self._window, go)

@@ -38,7 +38,7 @@ from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load, tightest_bend, turning_speed
 from planners.world.vehicles.vehicle import FIRST_HITCH, CarWithTrailers, Vehicle
 
-KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
+KNOWN: Final = 0.2  # share of its time that a known ending counts, so that it is tried first
 FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
 EXPANSIONS_A_TURN: Final = 64  # of both trees together

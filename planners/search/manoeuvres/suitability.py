@@ -20,7 +20,7 @@ TIGHT: Final = 0.6  # a goal with less room around it is tight
 def suits(goal: Floats, vehicle: Vehicle) -> bool:
     """Whether a goal, that of ``goal_of``, may be reached by manoeuvres: a pose, at rest.
 
-    Who cannot stand has to change speed and turn at once, and may arrive at any speed that is asked.
+    A vehicle that cannot stand has to change speed and turn at once, and may arrive at any speed asked for.
     """
     if vehicle.min_speed > 0.0 and not vehicle.first_order:
         return False
@@ -36,7 +36,7 @@ def suits(goal: Floats, vehicle: Vehicle) -> bool:
 def is_tight(goal: Floats, vehicle: Vehicle, scene: Scene) -> bool:
     """Whether there is so little room around a goal that suits that other searches have small hopes.
 
-    Who cannot stand has no room to try again.
+    A vehicle that cannot stand has no room to try again.
     """
     root = pose_of(goal, state_size(vehicle))[np.newaxis]
     return bool(vehicle.min_speed > 0.0 or room_around(root, time_reversed(vehicle), vehicle, scene) < TIGHT)

@@ -29,7 +29,7 @@ def time_reversed(vehicle: Vehicle) -> Vehicle:
 
 
 def at_its_slowest(vehicle: Vehicle) -> Vehicle:
-    """Who cannot stand turns most sharply at its least speed, and what leads there can be driven faster."""
+    """What cannot stand turns most sharply at its least speed, and what leads there can be driven faster."""
     if vehicle.min_speed <= 0.0:
         return vehicle
     return vehicle._replace(max_speed=min(SLOWLY * vehicle.min_speed, vehicle.max_speed))

@@ -40,7 +40,7 @@ def _seconds_to_stop(
 ) -> float:
     """The least time over a distance, or up to ``room`` metres more, from one speed to at most another.
 
-    Who is too fast for that brakes, and has to come back: ``late_s`` for each metre.
+    A vehicle that is too fast for that brakes, and has to come back: ``late_s`` for each metre.
     """
     acceleration = control_limits(vehicle)[0]
     braking = (speed * speed - most * most) / (2.0 * acceleration)

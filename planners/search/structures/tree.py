@@ -190,8 +190,8 @@ def connect_to_goal(
 ) -> bool:
     """Drive from a vertex to the goal as if nothing were in the way, and add the drive if it is free.
 
-    ``top`` is the largest speed in m/s. Who cannot reverse tries to turn more slowly first, and sharply, if
-    that is quicker (``best_pace``).
+    ``top`` is the largest speed in m/s. A vehicle that cannot reverse tries to turn more slowly first, and
+    sharply, if that is quicker (``best_pace``).
     """
     store(tree.connection.states, 0, load(tree.states, vertex, vehicle))
     pace = best_pace(tree.connection, tree.gears[vertex], goal, top, vehicle)
