@@ -79,112 +79,154 @@ MOST_IF_SHORT_S = 1.0  # ... but then at most so many
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     """Plan from the problem's start to its goal. A guide is not looked at."""
-    latest = working_clock() + query.limits.seconds
-    go = query.workspace.buffers(allocate_cost_to_go)
-    frontier = query.workspace.buffers(allocate_frontier)
-    vehicle, scene = query.vehicle, query.scene
-    improving = math.isfinite(query.limits.bound_s)
-    levels = settings.levels if is_canonical(query.problem) else settings.anywhere
-    arrival = query.problem.arrival
-    if arrival is not None and arrival.most_speed < vehicle.max_speed:
-        levels = levels[2:] if vehicle.first_order else levels[1:]
-    level, tried = levels[0], 0
-    ahead = Ahead(go, NOWHERE, NO_TABLE)
-    manoeuvring: Manoeuvring | None = None
-    joining: Manoeuvring | None = None
-    joined = False
-    squeezed: Plan | None = None
-    expected_s: float | None = None
-    winds, straight = False, 0.0
-    may_squeeze = not improving
-    may_stop = not improving and query.prefix is None
+    return _LatticeSearch(query, settings).outcome()
 
-    def occupied() -> Bits:
-        if query.occupied is not None:
-            return query.occupied
-        return drawing_of(query.problem, query.workspace).occupied
 
-    def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead, manoeuvring, joining, expected_s, winds, straight
+class _LatticeSearch:
+    """A search over primitives, and beside it searches for manoeuvres if the goal suits them."""
+
+    def __init__(self, query: Query, settings: LatticeSettings) -> None:
+        self._latest = working_clock() + query.limits.seconds
+        self._query, self._settings = query, settings
+        self._go = query.workspace.buffers(allocate_cost_to_go)
+        self._frontier = query.workspace.buffers(allocate_frontier)
+        self._improving = math.isfinite(query.limits.bound_s)
+        self._levels = _levels(query, settings)
+        self._level, self._tried = self._levels[0], 0
+        self._ahead = Ahead(self._go, NOWHERE, NO_TABLE)
+        self._manoeuvring: Manoeuvring | None = None
+        self._joining: Manoeuvring | None = None  # the same, aimed at known endings
+        self._joined = False
+        self._squeezed: Plan | None = None
+        self._expected_s: float | None = None
+        self._winds, self._straight = False, 0.0
+        self._may_squeeze = not self._improving
+        self._may_stop = not self._improving and query.prefix is None
+        self._at_random = growing(query)
+
+    def outcome(self) -> Outcome:
+        """Search, and look for drives of other kinds if they are asked for."""
+        query = self._query
+        # RRT does not reverse, as the second level does
+        explore_from = 2 if self._levels == self._settings.anywhere else 1
+        outcome = search(
+            replace(query, beside=self._beside),
+            _restart_after(query, self._settings),
+            self._prepare,
+            self._grow,
+            self._explore,
+            explore_from=explore_from,
+            is_enclosed=self._is_enclosed,
+        )
+        if query.others and outcome.plan is not None and self._squeezed is None:
+            outcome = self._with_others(outcome, outcome.plan)
+        outcome = replace(outcome, expected_s=self._expected_s, winds=self._winds)
+        if self._joining is None:
+            return outcome
+        return replace(
+            outcome,
+            expansions=outcome.expansions + self._joining.expansions,
+            collision_checks=outcome.collision_checks + self._joining.checks,
+            joined=self._joined,
+        )
+
+    def _occupied(self) -> Bits:
+        if self._query.occupied is not None:
+            return self._query.occupied
+        return drawing_of(self._query.problem, self._query.workspace).occupied
+
+    def _prepare(self, tree: trees.Tree, goal: Floats, trial: int) -> None:
+        """Begin the next level; before the first trial find out about the way to the goal."""
+        query, settings, vehicle = self._query, self._settings, self._query.vehicle
         if trial == 0:
-            ahead = ahead_of(goal, go, vehicle)
-            cells = occupied()
-            if not query.knows_way:
-                fill_cost_to_go(cells, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
-            straight = math.hypot(goal[X] - tree.states[0, 0], goal[Y] - tree.states[0, 1])
-            winds = way_from(tree.states, go, vehicle)[0] > settings.winding * straight + settings.winding_m
-            if suits(goal, vehicle):
-                manoeuvring = Manoeuvring(query, goal, cells)
-                expected_s = settings.pose_longer * manoeuvring.least_seconds
-                if query.endings is not None:
-                    joining = manoeuvring.joining(query, query.endings)
-        level = paced(levels[min(tried, len(levels) - 1)], vehicle, settings.sharpest)
-        tried += 1
-        if trial == 0 and ahead.table is NO_TABLE:
-            expected_s = expected_seconds(tree.states, ahead, level.heading_s, level.late_s, vehicle)
-            if winds:  # through walls, maybe
-                expected_s = min(expected_s, settings.winding * straight / vehicle.max_speed)
-        if improving:
-            level = varied(level, settings.improving_greed, query)
-        begin_lattice(tree, frontier, ahead, level, vehicle)
+            self._look_ahead(tree, goal)
+        coarse = self._levels[min(self._tried, len(self._levels) - 1)]
+        self._level = paced(coarse, vehicle, settings.sharpest)
+        self._tried += 1
+        if trial == 0 and self._ahead.table is NO_TABLE:
+            level = self._level
+            expected_s = expected_seconds(tree.states, self._ahead, level.heading_s, level.late_s, vehicle)
+            if self._winds:  # through walls, maybe
+                expected_s = min(expected_s, settings.winding * self._straight / vehicle.max_speed)
+            self._expected_s = expected_s
+        if self._improving:
+            self._level = varied(self._level, settings.improving_greed, query)
+        begin_lattice(tree, self._frontier, self._ahead, self._level, vehicle)
 
-    def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
+    def _look_ahead(self, tree: trees.Tree, goal: Floats) -> None:
+        """Find the way over the cells, and begin the searches for manoeuvres that the goal suits."""
+        query, settings, go = self._query, self._settings, self._go
+        self._ahead = ahead_of(goal, go, query.vehicle)
+        cells = self._occupied()
+        if not query.knows_way:
+            fill_cost_to_go(cells, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+        self._straight = math.hypot(goal[X] - tree.states[0, 0], goal[Y] - tree.states[0, 1])
+        metres = way_from(tree.states, go, query.vehicle)[0]
+        self._winds = metres > settings.winding * self._straight + settings.winding_m
+        if suits(goal, query.vehicle):
+            manoeuvring = Manoeuvring(query, goal, cells)
+            self._manoeuvring = manoeuvring
+            self._expected_s = settings.pose_longer * manoeuvring.least_seconds
+            if query.endings is not None:
+                self._joining = manoeuvring.joining(query, query.endings)
+
+    def _grow(self, tree: trees.Tree, goal: Floats, until: int) -> None:
+        """Drive primitives, and by turns look for manoeuvres, if any lead to the goal."""
         counts = tree.counts
-        if manoeuvring is None:
-            grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
+        if self._manoeuvring is None:
+            self._grow_lattice(tree, goal, until)
             return
-        stop(tree, goal)
-        here, there = settings.if_tight if manoeuvring.is_hard else settings.by_turns
+        manoeuvring = self._stopped(self._manoeuvring, tree, goal)
+        here, there = self._settings.if_tight if manoeuvring.is_hard else self._settings.by_turns
         now = here
         if counts[trees.EXPANSIONS] == 0:
-            now = 0 if manoeuvring.is_tight else settings.alone
+            now = 0 if manoeuvring.is_tight else self._settings.alone
         while counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < until:
-            if join(tree, manoeuvring.is_tight):
-                return
-            if squeezes(tree, manoeuvring):
+            if self._joins(tree, manoeuvring.is_tight) or self._squeezes(tree, manoeuvring):
                 return
             before = int(counts[trees.EXPANSIONS])
-            grow_lattice(tree, goal, min(before + now, until), frontier, ahead, level, vehicle, scene)
+            self._grow_lattice(tree, goal, min(before + now, until))
             if counts[trees.GOAL_VERTEX] < 0:
-                manoeuvre(tree, manoeuvring, min(there, until - int(counts[trees.EXPANSIONS])))
+                _manoeuvre(tree, manoeuvring, min(there, until - int(counts[trees.EXPANSIONS])))
             if counts[trees.EXPANSIONS] == before:
                 return
             now = here
 
-    def stop(tree: trees.Tree, goal: Floats) -> None:
-        """After a while look for manoeuvres from where the vehicle has stopped: at rest it can turn back."""
-        nonlocal may_stop, manoeuvring
-        if may_stop and tree.counts[trees.EXPANSIONS] >= settings.moving:
-            may_stop = False
-            prefix = stopping(query.problem, vehicle, scene)
-            if prefix is not None:
-                limits = replace(query.limits, seconds=max(latest - working_clock(), 0.0))
-                manoeuvring = Manoeuvring(replace(query, prefix=prefix, limits=limits), goal, occupied())
+    def _grow_lattice(self, tree: trees.Tree, goal: Floats, until: int) -> None:
+        query = self._query
+        grow_lattice(tree, goal, until, self._frontier, self._ahead, self._level, query.vehicle, query.scene)
 
-    def manoeuvre(tree: trees.Tree, search: Manoeuvring, most: int) -> None:
-        expansions, checks = search.expansions, search.checks
-        search.advance(tree, most)
-        tree.counts[trees.EXPANSIONS] += search.expansions - expansions
-        tree.counts[trees.CHECKS] += search.checks - checks
-
-    def explore(tree: trees.Tree, goal: Floats, until: int) -> None:
+    def _explore(self, tree: trees.Tree, goal: Floats, until: int) -> None:
         """RRT, or where it has small hopes the search for manoeuvres."""
-        counts = tree.counts
+        manoeuvring = self._manoeuvring
         if manoeuvring is not None:
-            stop(tree, goal)
+            manoeuvring = self._stopped(manoeuvring, tree, goal)
         if manoeuvring is None or not manoeuvring.is_hard:
-            at_random(tree, goal, until)
-        elif not join(tree, manoeuvring.is_tight) and not squeezes(tree, manoeuvring):
-            manoeuvre(tree, manoeuvring, until - int(counts[trees.EXPANSIONS]))
+            self._at_random(tree, goal, until)
+        elif not self._joins(tree, manoeuvring.is_tight) and not self._squeezes(tree, manoeuvring):
+            _manoeuvre(tree, manoeuvring, until - int(tree.counts[trees.EXPANSIONS]))
             if manoeuvring.is_over:
-                at_random(tree, goal, until)
+                self._at_random(tree, goal, until)
 
-    def join(tree: trees.Tree, is_tight: bool) -> bool:
+    def _stopped(self, manoeuvring: Manoeuvring, tree: trees.Tree, goal: Floats) -> Manoeuvring:
+        """The search for manoeuvres; after a while from where the vehicle stops: at rest it can turn back."""
+        query = self._query
+        if self._may_stop and tree.counts[trees.EXPANSIONS] >= self._settings.moving:
+            self._may_stop = False
+            prefix = stopping(query.problem, query.vehicle, query.scene)
+            if prefix is not None:
+                limits = replace(query.limits, seconds=max(self._latest - working_clock(), 0.0))
+                asked = replace(query, prefix=prefix, limits=limits)
+                manoeuvring = Manoeuvring(asked, goal, self._occupied())
+                self._manoeuvring = manoeuvring
+        return manoeuvring
+
+    def _joins(self, tree: trees.Tree, is_tight: bool) -> bool:
         """Aim at known endings with as much work as all else has had: what is found alone is found still.
 
         Work is counted in expansions and in looks at obstacles, of which one expansion may take many.
         """
-        nonlocal joined
+        joining, settings = self._joining, self._settings
         if joining is None:
             return False
         in_advance = max(settings.head_start - joining.expansions, 0) if is_tight else 0
@@ -192,75 +234,77 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         if joining.checks >= tree.counts[trees.CHECKS]:
             behind = 0
         found = joining.advance(tree, max(in_advance, behind))
-        joined = found and joining.joined
+        self._joined = found and joining.joined
         return found
 
-    def squeezes(tree: trees.Tree, search: Manoeuvring) -> bool:
+    def _squeezes(self, tree: trees.Tree, manoeuvring: Manoeuvring) -> bool:
         """Once the search for manoeuvres is stuck, look for drives of slimmer bodies; whether that helped."""
-        nonlocal may_squeeze, squeezed
-        if may_squeeze and search.is_stuck:
-            may_squeeze = False
-            left = query.limits.expansions - int(tree.counts[trees.EXPANSIONS])
-            squeezed, expansions, checks = squeeze(query, search, left // 2, until_polish())
-            tree.counts[trees.EXPANSIONS] += expansions
-            tree.counts[trees.CHECKS] += checks
-        return squeezed is not None
+        if self._may_squeeze and manoeuvring.is_stuck:
+            self._may_squeeze = False
+            left = self._query.limits.expansions - int(tree.counts[trees.EXPANSIONS])
+            squeezed = squeeze(self._query, manoeuvring, left // 2, self._until_polish())
+            self._squeezed = squeezed.plan
+            tree.counts[trees.EXPANSIONS] += squeezed.expansions
+            tree.counts[trees.CHECKS] += squeezed.checks
+        return self._squeezed is not None
 
-    def is_enclosed() -> bool:
+    def _is_enclosed(self) -> bool:
         """Whether squeezing was in vain, too, and no known ending may lead to the goal.
 
         A search for something better knows a drive there.
         """
-        if improving or manoeuvring is None or may_squeeze or not (joining is None or joining.is_over):
+        if self._improving or self._manoeuvring is None or self._may_squeeze:
             return False
-        return manoeuvring.is_enclosed
+        return (self._joining is None or self._joining.is_over) and self._manoeuvring.is_enclosed
 
-    def until_polish() -> float:
-        left = latest - working_clock()
-        return latest - max(KEPT_BACK * left, min(KEPT_IF_SHORT * left, MOST_IF_SHORT_S))
+    def _until_polish(self) -> float:
+        """When to end, by ``working_clock``, so that there is time left to polish what is found."""
+        left = self._latest - working_clock()
+        return self._latest - max(KEPT_BACK * left, min(KEPT_IF_SHORT * left, MOST_IF_SHORT_S))
 
-    def beside(work: int) -> Plan | None:
-        if squeezed is not None or query.beside is None:
-            return squeezed
-        return query.beside(work)
+    def _beside(self, work: int) -> Plan | None:
+        if self._squeezed is not None or self._query.beside is None:
+            return self._squeezed
+        return self._query.beside(work)
 
-    at_random = growing(query)
-    explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    outcome = search(
-        replace(query, beside=beside),
-        _restart_after(query, settings),
-        prepare,
-        grow,
-        explore,
-        explore_from=explore_from,
-        is_enclosed=is_enclosed,
-    )
-    if query.others and outcome.plan is not None and manoeuvring is not None and squeezed is None:
+    def _with_others(self, outcome: Outcome, plan: Plan) -> Outcome:
+        """The outcome with drives of other kinds than its plan, if searches for manoeuvres find such."""
+        manoeuvring, joining, settings = self._manoeuvring, self._joining, self._settings
+        if manoeuvring is None:
+            return outcome
         began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
-        left = query.limits.expansions - outcome.expansions
-        ends = until_polish()
-        longest = settings.longest, query.limits.further
+        left = self._query.limits.expansions - outcome.expansions
+        ends = self._until_polish()
+        longest = settings.longest, self._query.limits.further
         left = manoeuvring.further(settings.further, longest, settings.for_one, left, ends)
         kept = manoeuvring.kept
-        if joining is not None and joined:  # else what is known does not fit here
+        if joining is not None and self._joined:  # else what is known does not fit here
             joining.further(settings.further, (0, 0), settings.further, left, ends)
             kept += joining.kept
-        outcome = replace(
+        return replace(
             outcome,
-            others=tuple(_differing(kept, outcome.plan)),
+            others=tuple(_differing(kept, plan)),
             expansions=outcome.expansions + manoeuvring.expansions - expansions,
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + working_clock() - began,
         )
-    outcome = replace(outcome, expected_s=expected_s, winds=winds)
-    if joining is None:
-        return outcome
-    return replace(
-        outcome,
-        expansions=outcome.expansions + joining.expansions,
-        collision_checks=outcome.collision_checks + joining.checks,
-        joined=joined,
-    )
+
+
+def _levels(query: Query, settings: LatticeSettings) -> tuple[Lattice, ...]:
+    """The lattices for a problem, one after another."""
+    levels = settings.levels if is_canonical(query.problem) else settings.anywhere
+    arrival, vehicle = query.problem.arrival, query.vehicle
+    if arrival is not None and arrival.most_speed < vehicle.max_speed:
+        return levels[2:] if vehicle.first_order else levels[1:]
+    return levels
+
+
+def _manoeuvre(tree: trees.Tree, manoeuvring: Manoeuvring, most: int) -> None:
+    """Search for a manoeuvre, by some expansions at most, and count its work with that of the tree."""
+    expansions, checks = manoeuvring.expansions, manoeuvring.checks
+    manoeuvring.advance(tree, most)
+    tree.counts[trees.EXPANSIONS] += manoeuvring.expansions - expansions
+    tree.counts[trees.CHECKS] += manoeuvring.checks - checks
 
 
 def _restart_after(query: Query, settings: LatticeSettings) -> int:
