@@ -15,6 +15,7 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.recall import default_recall
 from planners.optimisation.polish import driven_near
+from planners.search.first_turns import first_turns
 from planners.search.guides.guidance import guidance
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
@@ -25,7 +26,7 @@ from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.vehicles.vehicle_files import said_vehicle
-from tasks.attempts.compile_assists import compile_assists
+from tasks.attempts.compile_assists import EMPTY, compile_assists
 from tasks.registry.memory_at import memory_at
 from tasks.settings.checks import check_asked, check_flag, check_no_recall, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
@@ -127,6 +128,7 @@ def _warmed(ready: Memory) -> Memory:
         stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
         driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # few plans need pressing
         guidance([stands])  # along a drive that is improved, as few are
+    first_turns(EMPTY, ready.vehicle, scene_of(EMPTY))  # few drives are looked for after one
     asked = None if library is None else first_question(library, scale)
     if asked is not None:
         ready.plan(asked)

@@ -143,9 +143,11 @@ class _LatticeSearch:
         coarse = self._levels[min(self._tried, len(self._levels) - 1)]
         self._level = paced(coarse, vehicle, settings.sharpest)
         self._tried += 1
-        if trial == 0 and self._ahead.table is NO_TABLE:
+        if trial == 0 and self._manoeuvring is None:
             level = self._level
             expected_s = expected_seconds(tree.states, self._ahead, level.heading_s, level.late_s, vehicle)
+            if self._ahead.table is not NO_TABLE:
+                expected_s *= settings.pose_longer
             if self._winds:  # through walls, maybe
                 expected_s = min(expected_s, settings.winding * self._straight / vehicle.max_speed)
             self._expected_s = expected_s

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 from planners.optimisation.polish import polish, polish_quickest
+from planners.search.after_turns import after_turns
+from planners.search.answer import Answer, best_of, with_work
 from planners.search.anytime import asking_for_kinds, improve
 from planners.search.manoeuvres.forward_arrivals import arrive_forwards
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
@@ -25,26 +26,33 @@ from planners.world.problem import Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 
-SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cost ...
-AGAIN = 1000  # ... and so many expansions its search at least, ...
-AS_MANY = 8  # ... so many times as many as the first one had, ...
-MOST_AGAIN = 8000  # ... and so many at most
+# Further searches for a shorter plan, elsewhere than in narrow places:
+SHORTER = 0.9  # of what the cheapest plan so far costs: so much may the next one cost
+AGAIN = 1000  # expansions of each further search at least
+AS_MANY = 8  # times the expansions of the first search: so many has each further one
+MOST_AGAIN = 8000  # expansions of each further search at most
 FOR_AGAIN = 0.5  # of the seconds left: the rest is for the polish
-LONG = 0.05  # share of its time by which a drive may take longer than was expected ...
-A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer, ...
-TO_POSE = 5  # ... and so many times as many to a pose, where drives of other kinds may be missed
-DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-SECOND = {"lattice": "follow"}  # who is asked as well where a planner finds nothing, or the way winds, ...
-TRIES = (1, 3)  # ... with so many times the expansions; to a place again if there still is nothing; ...
-LATE = 1.1  # ... and where a drive to a pose takes so many times as long as was expected
-FAR_M = 8.0  # a pose so far away may be driven to by way of its place ...
-PLACE_M = 4.0  # ... to within so many metres of it, ...
-BEFORE_PLACE = 12_000  # ... after so many expansions without a plan
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
+# Another planner, asked where nothing is found, the way winds, or a drive to a pose is late:
+SECOND = {"lattice": "follow"}  # which one
+TRIES = (1, 3)  # times the expansions of the query: of its search, and of one more where there is no plan yet
+LATE = 1.1  # times as long as was expected: a drive to a pose that takes longer is late
+MUCH_LATE = 1.3  # the same where little room at the goal makes drives longer, or other ways were tried
 
-Answer = tuple[Outcome, Plan | None]  # of a search, its plan polished; and what that was before
+# A drive to the place of a pose, and on from there, looked for where the search for the pose is in trouble:
+FAR_M = 8.0  # metres to the pose at least
+PLACE_M = 4.0  # how near to the pose counts as its place
+BEFORE_PLACE = 12_000  # expansions that the search for the pose has before
+
+# The improvement of a drive that still takes longer than was expected:
+LONG = 0.05  # share of its time that it may take longer
+A_SECOND = 1000  # expansions for each second that it takes longer
+TO_POSE = 5  # times as many to a pose, where drives of other kinds may be missed
+AFTER_TURN = 120  # expansions for each second, to a place, of each search that goes on from a turn
+
+DEAR = 5.0  # seconds that an answer costs more than in the cheaper gear: then a third way is tried
 
 
 def search_and_polish(
@@ -91,7 +99,7 @@ def search_and_polish(
 
     by_time = counting_time(vehicle)
     answers = [_searched_and_polished(planner, query, seed, given, below_s), as_if(by_time, given)]
-    best = _best_of(answers, vehicle)[0].plan
+    best = best_of(answers, vehicle)[0].plan
     slow = slowed(vehicle, float(start_state(query.problem, vehicle)[3]))
     least = min(vehicle.costs.forwards, vehicle.costs.backwards)
     is_dear = best is not None and cost_of(best, vehicle) - least * best.duration_s > DEAR
@@ -103,25 +111,7 @@ def search_and_polish(
             _, quicker = polish_quickest(query.problem, [answer.plan], *around, seconds=left)
             answer = replace(answer, plan=quicker.plan or answer.plan)
         answers.append((answer, rough))
-    return _best_of(answers, vehicle)
-
-
-def _best_of(answers: Sequence[Answer], vehicle: Vehicle) -> Answer:
-    """The first answer with the plan that costs least, or without one if none has any; the work is of all."""
-    best, rough = min(answers, key=lambda each: cost_of(each[0].plan, vehicle) if each[0].plan else math.inf)
-    return _with_work([each for each, _ in answers], best), rough
-
-
-def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
-    """One outcome with the work and the time of all."""
-    return replace(
-        one,
-        collision_checks=sum(each.collision_checks for each in all_of),
-        expansions=sum(each.expansions for each in all_of),
-        nodes=sum(each.nodes for each in all_of),
-        roadmap_seconds=sum(each.roadmap_seconds for each in all_of),
-        search_seconds=sum(each.search_seconds for each in all_of),
-    )
+    return best_of(answers, vehicle)
 
 
 def _searched_and_polished(
@@ -138,14 +128,16 @@ def _searched_and_polished(
         first = replace(query, rng=copy.deepcopy(query.rng), limits=replace(query.limits, expansions=most))
     found, best = _first_answer(planner, first, seed, given, below_s, until)
     expected_s = math.inf if found.expected_s is None else found.expected_s
-    plan = best[0].plan
-    is_late = plan is not None and plan.duration_s > LATE * expected_s
-    is_doubtful = not query.others and (found.winds or (is_late and query.problem.asks_for_pose))
+    late = MUCH_LATE if query.others else LATE
+    is_late = query.problem.asks_for_pose and _takes(best) > late * expected_s
+    is_doubtful = is_late or (found.winds and not query.others)
     if goes_by_place and (is_doubtful or _is_open(best)):
-        best = _best_of([best, _by_way_of_place(planner, query, seed, until)], vehicle)
-    if _is_open(best) and first.limits.expansions < query.limits.expansions:
-        best = _best_of([best, _first_answer(planner, query, seed, given, below_s, until)[1]], vehicle)
-    if asks_others and not query.others and (best[0].plan is None or not goes_by_place):
+        best = best_of([best, _by_way_of_place(planner, query, seed, until)], vehicle)
+        is_doubtful = found.plan is None and _takes(best) > MUCH_LATE * expected_s
+    is_cut = first.limits.expansions < query.limits.expansions
+    if is_cut and (is_doubtful or _is_open(best)):
+        best = best_of([best, _first_answer(planner, query, seed, given, below_s, until)[1]], vehicle)
+    if asks_others and not query.others:
         best = _with_second(SECOND[planner], query, seed, is_doubtful, best, below_s, until)
     answer, rough = best
     plan = answer.plan
@@ -157,14 +149,25 @@ def _searched_and_polished(
         or too_long_s <= LONG * plan.duration_s
     ):
         return answer, rough
-    worth = int(A_SECOND * (TO_POSE if query.problem.asks_for_pose else 1) * too_long_s)
-    answer, anew = _improved(planner, query, seed, answer, worth, until)
+    if query.problem.asks_for_pose:
+        worth = TO_POSE * A_SECOND * too_long_s
+    else:
+        if asks_others and query.prefix is None:
+            worth = AFTER_TURN * too_long_s
+            answer, rough = after_turns(planner, query, seed, (answer, rough), plan, int(worth), until)
+        worth = A_SECOND * max(_takes((answer, rough)) - expected_s, 0.0)
+    answer, anew = _improved(planner, query, seed, answer, int(worth), until)
     return answer, anew or rough
 
 
 def _is_far_pose(problem: Problem) -> bool:
     """Whether a pose is asked for whose place is some way off."""
     return problem.asks_for_pose and math.dist(problem.start[:2], problem.goal) > FAR_M
+
+
+def _takes(answer: Answer) -> float:
+    """How many seconds the drive of an answer takes; 0 if there is none."""
+    return 0.0 if answer[0].plan is None else answer[0].plan.duration_s
 
 
 def _is_open(answer: Answer) -> bool:
@@ -222,7 +225,7 @@ def _first_answer(
         around = vehicle, query.scene, query.workspace
         polished = polish(query.problem, forwards, *around, seconds=until - working_clock())
         best, rough = replace(best, joined=rough is given), forwards  # it begins as the other drive, no more
-    answer = _with_work(found, replace(best, plan=polished.plan or rough))
+    answer = with_work(found, replace(best, plan=polished.plan or rough))
     return found[0], (answer, rough)
 
 
@@ -247,7 +250,7 @@ def _with_second(
         rng = generator(seed, "second", query.problem.id, planner, number)
         asked = replace(query, rng=rng, limits=limits, beside=None)
         answers = [best, _first_answer(planner, asked, seed, None, below_s, until)[1]]
-        best = _best_of(answers, query.vehicle)
+        best = best_of(answers, query.vehicle)
     return best
 
 
@@ -282,7 +285,7 @@ def _by_way_of_place(planner: str, query: Query, seed: int, until: float) -> Ans
     if plan is not None:
         polished = polish(problem, plan, *around, seconds=max(until - working_clock(), 0.0)).plan
         onward = replace(onward, plan=polished or plan)
-    return _with_work([there_found, onward], onward), plan
+    return with_work([there_found, onward], onward), plan
 
 
 def _improved(

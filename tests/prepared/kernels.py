@@ -8,6 +8,7 @@ from typing import Final
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.retiming import retimed
 from planners.optimisation.polish import driven_near, polish
+from planners.search.first_turns import first_turns
 from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.geometry.collision import scene_of
@@ -28,13 +29,14 @@ def compile_library(vehicle: Vehicle) -> None:
 
 
 def compile_arrivals(vehicle: Vehicle) -> None:
-    """Compile what drives to a pose, and what mends and polishes such a drive."""
+    """Compile what drives to a pose, what mends and polishes such a drive, and turns to begin one with."""
     asked = replace(EMPTY, goal=(12.0, 9.0), goal_radius=0.5, arrival=Arrival(0.5, 0.2, 0.0, 0.0))
     found = solve(asked, "lattice", vehicle=vehicle, limits=Limits(expansions=2_000)).plan
     assert found is not None
     scene, workspace = scene_of(asked), Workspace()
     polish(asked, found, vehicle, scene, workspace)
     driven_near(asked, retimed(found, vehicle, vehicle), vehicle, scene, workspace)
+    first_turns(asked, vehicle, scene)
 
 
 COMPILED: Final = (*GROUPS, compile_library, compile_arrivals)  # no worker of a run needs the last two

@@ -72,6 +72,7 @@ def asked(vehicle: Vehicle, number: int, seed: int = 5001) -> Problem | None:
 def without_improvement(problem: Problem, vehicle: Vehicle) -> float:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(searching, "A_SECOND", 0)
+        patched.setattr(searching, "AFTER_TURN", 0)
         attempt = solve(problem, "lattice", seed=1, vehicle=vehicle)
     return attempt.duration_s or math.inf
 
