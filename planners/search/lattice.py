@@ -148,7 +148,7 @@ class _LatticeSearch:
             expected_s = expected_seconds(tree.states, self._ahead, level.heading_s, level.late_s, vehicle)
             if self._ahead.table is not NO_TABLE:
                 expected_s *= settings.pose_longer
-            if self._winds:  # through walls, maybe
+            elif self._winds:  # through walls, maybe
                 expected_s = min(expected_s, settings.winding * self._straight / vehicle.max_speed)
             self._expected_s = expected_s
         if self._improving:

@@ -39,7 +39,8 @@ POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished c
 SECOND = {"lattice": "follow"}  # which one
 TRIES = (1, 3)  # times the expansions of the query: of its search, and of one more where there is no plan yet
 LATE = 1.1  # times as long as was expected: a drive to a pose that takes longer is late
-MUCH_LATE = 1.3  # the same where little room at the goal makes drives longer, or other ways were tried
+TIGHT_LATE = 2.0  # the same with little room around the pose, which makes all drives longer
+MUCH_LATE = 1.3  # the same where the search for a far pose found nothing, and another way was tried
 
 # A drive to the place of a pose, and on from there, looked for where the search for the pose is in trouble:
 FAR_M = 8.0  # metres to the pose at least
@@ -128,7 +129,7 @@ def _searched_and_polished(
         first = replace(query, rng=copy.deepcopy(query.rng), limits=replace(query.limits, expansions=most))
     found, best = _first_answer(planner, first, seed, given, below_s, until)
     expected_s = math.inf if found.expected_s is None else found.expected_s
-    late = MUCH_LATE if query.others else LATE
+    late = TIGHT_LATE if query.others else LATE
     is_late = query.problem.asks_for_pose and _takes(best) > late * expected_s
     is_doubtful = is_late or (found.winds and not query.others)
     if goes_by_place and (is_doubtful or _is_open(best)):
@@ -246,7 +247,9 @@ def _with_second(
             is_worth = answer.status is Status.BUDGET_SPENT and (number == 0 or expansions <= POSE_EXPANSIONS)
         if not is_worth:
             break
-        limits = replace(query.limits, expansions=expansions, seconds=max(until - working_clock(), 0.0))
+        limits = replace(query.limits, expansions=expansions, seconds=until - working_clock())
+        if limits.seconds <= 0.0:
+            break
         rng = generator(seed, "second", query.problem.id, planner, number)
         asked = replace(query, rng=rng, limits=limits, beside=None)
         answers = [best, _first_answer(planner, asked, seed, None, below_s, until)[1]]

@@ -121,7 +121,7 @@ def check_verified(attempts: pd.DataFrame) -> None:
     Raises:
         StorageError: there is such an attempt.
     """
-    if attempts["verified"].isna().all():  # rows from before the answer was kept
+    if attempts[["verified", "polished"]].isna().all(axis=None):  # of before either was kept
         return
     wrong = attempts[attempts["solved"] & ~attempts["verified"].eq(True)]
     if len(wrong):

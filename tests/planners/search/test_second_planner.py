@@ -91,7 +91,7 @@ def test_a_far_pose_beside_a_wall_is_doubted_where_its_drive_takes_much_longer_t
     answer = solve(problem, "lattice")
     assert answer.plan is not None
     assert faults(problem, answer.plan) == []
-    with patch.object(searching, "MUCH_LATE", math.inf):
+    with patch.object(searching, "TIGHT_LATE", math.inf):
         undoubted = solve(problem, "lattice")
     assert undoubted.plan is not None
     assert answer.plan.duration_s < 0.8 * undoubted.plan.duration_s

@@ -53,6 +53,15 @@ def test_no_report_is_made_of_plans_that_the_authority_did_not_accept(tmp_path: 
         check_verified(read_attempts(tmp_path / "wrong.parquet"))
 
 
+def test_rows_without_an_answer_of_the_authority_pass_only_if_older_than_the_column(tmp_path: Path) -> None:
+    unjudged = {**ATTEMPT, "verified": None, "polished": True}
+    write_attempts(tmp_path / "unjudged.parquet", [unjudged])
+    with pytest.raises(StorageError, match="1 of 1 attempts"):
+        check_verified(read_attempts(tmp_path / "unjudged.parquet"))
+    write_attempts(tmp_path / "old.parquet", [{**unjudged, "polished": None}])
+    check_verified(read_attempts(tmp_path / "old.parquet"))
+
+
 def test_claims_are_judged_a_second_time_by_the_largest_run_of_the_other_method(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
