@@ -26,12 +26,13 @@ def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
     name = job.do.__name__.replace("_", "-")
 
     @functools.wraps(job.do)
-    def run(chunk: AnyPiece) -> Done[Result]:
-        return job.run(chunk)
+    def run(piece: AnyPiece) -> Done[Result]:
+        return job.run(piece)
 
+    del run.__wrapped__  # or Prefect knows its argument by the name that it has in what is wrapped
     return task(
         name=name,
-        task_run_name=f"{name} {{chunk.class_name}} {{chunk.index}}",
+        task_run_name=f"{name} {{piece.class_name}} {{piece.index}}",
         cache_policy=NO_CACHE,
         persist_result=False,  # Prefect would keep it on the worker's own disk
         retries=RETRIES,

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from prefect.client.schemas.objects import State, StateType
+from prefect.utilities.callables import get_call_parameters
 
 from storage.errors import StorageError, UnreachableError
 from tasks import stages
@@ -18,7 +19,11 @@ from tasks.fan_out import keys
 from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.piece_task import _may_pass, piece_task
-from tasks.fan_out.stage import Stage, is_marked, mark_done
+from tasks.fan_out.stage import Job, Stage, is_marked, mark_done
+from tasks.libraries.judge_library import JUDGE_LIBRARY
+from tasks.requests.adapt_pieces import ADAPT
+from tasks.requests.gather_pieces import GATHER
+from tasks.requests.problem_parts import SOLVE
 from tasks.settings.presets import for_preset
 
 SETTINGS = for_preset("smoke")
@@ -112,6 +117,20 @@ def test_the_result_of_a_chunk_is_kept_under_its_key_and_counts_only_with_its_ou
     assert one.result.parent == other.result.parent != one.run.path
     one.shard("results").unlink()
     assert STAGE.kept(one) is None
+
+
+class Numbered(NamedTuple):
+    class_name: str = "lot"
+    index: int = 3
+
+
+@pytest.mark.parametrize("job", [*STAGES, ADAPT, GATHER, JUDGE_LIBRARY, SOLVE], ids=lambda job: job.name)
+def test_prefect_can_name_the_run_of_each_piece(job: Job[Any, Any]) -> None:
+    """Whatever the function that does it calls its argument."""
+    done_by = piece_task(job)
+    asked = get_call_parameters(done_by.fn, (Numbered(),), {})
+    assert isinstance(done_by.task_run_name, str)
+    assert done_by.task_run_name.format(**asked).endswith(" lot 3")
 
 
 def test_a_damaged_result_has_its_chunk_done_again(tmp_path: Path) -> None:
