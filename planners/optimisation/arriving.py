@@ -27,6 +27,7 @@ from planners.optimisation.local_model import (
     differentiate_nearness,
     differentiate_steps,
     nearness_cost,
+    nearness_model,
 )
 from planners.optimisation.pressing import WAYS, Way, press
 from planners.world.arrays import Floats
@@ -118,6 +119,7 @@ def shorten(
     """
     last = LastMotion(goal[LEAST_SPEED], goal[MOST_SPEED], goal[MOST_TURN])
     aim = model.vectors[5]
+    near = nearness_model(model)
     aim_at(model, steps, goal)
     press(model, steps, fewer, way.even, last, vehicle)
     after = steps - fewer
@@ -132,7 +134,7 @@ def shorten(
         if anew:
             differentiate_steps(model, after, vehicle)
             for k in range(1, after + 1):
-                differentiate_nearness(model, k, vehicle, scene, circles, barrier)
+                differentiate_nearness(near, k, vehicle, scene, circles, barrier)
             pull_to_aim(model, after, goal)
         hold = way.hold if gapped else min(way.hold, GENTLE_HOLD)
         linear, quadratic = sweep_back(model, after, last, damping, hold, gapped, vehicle)

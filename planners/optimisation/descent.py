@@ -17,6 +17,7 @@ from planners.optimisation.local_model import (
     differentiate_nearness,
     differentiate_steps,
     nearness_cost,
+    nearness_model,
 )
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
@@ -163,6 +164,7 @@ def descend(
     ended = False
     anew = True
     aim = aim_from(model, steps, goal)
+    near = nearness_model(model)
     cost = 0.0
     while used < iterations:
         if anew:
@@ -171,7 +173,7 @@ def descend(
             cost = miss(model.states[steps, 0], model.states[steps, 1], aim)
             for k in range(1, steps + 1):
                 cost += effort(model.controls[k - 1, 0], model.controls[k - 1, 1], vehicle)
-                cost += differentiate_nearness(model, k, vehicle, scene, circles, barrier)
+                cost += differentiate_nearness(near, k, vehicle, scene, circles, barrier)
             pull(model, steps, aim)
         linear, quadratic = sweep_back(model, steps, ANY_MOTION, damping, 0.0, False, vehicle)
         used += 1

@@ -46,6 +46,25 @@ class Model(NamedTuple):
     )
 
 
+class NearnessModel(NamedTuple):
+    """What nearness needs of a ``Model``: to pass on all of it for each state costs as much as the work."""
+
+    states: Floats
+    gradient: Floats
+    curvature: Floats
+    by_state: Floats  # [S] scratch
+    nudged: Floats
+    box_slopes: Floats
+
+
+@inlined
+def nearness_model(model: Model) -> NearnessModel:
+    """What ``differentiate_nearness`` reads of a model, and fills in."""
+    return NearnessModel(
+        model.states, model.gradient, model.curvature, model.vectors[0], model.nudged, model.box_slopes
+    )
+
+
 def allocate_model(steps: int, size: int) -> Model:
     """Buffers for drives of up to ``steps`` steps with states of ``size`` numbers."""
     shapes = (
@@ -108,13 +127,13 @@ def nearness_cost(
 
 @lean
 def differentiate_nearness(
-    model: Model, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
+    near: NearnessModel, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
 ) -> float:
     """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``; returns it."""
-    states = model.states
+    states = near.states
     size = numbers_of(states, vehicle)
-    gradient = model.gradient[i]
-    curvature = model.curvature[i]
+    gradient = near.gradient[i]
+    curvature = near.curvature[i]
     for r in range(size):
         gradient[r] = 0.0
         for c in range(size):
@@ -129,16 +148,16 @@ def differentiate_nearness(
         reach = length(box[4], box[5]) + far
         if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
             if not is_near:
-                _differentiate_boxes(model, i, vehicle)
+                _differentiate_boxes(near, i, vehicle)
                 is_near = True
             for k in range(4):
                 axis = wall(k, bounds)
-                cost += _add_gap(model, i, body, box, axis, gap_along(axis, box), barrier, vehicle)
+                cost += _add_gap(near, i, body, box, axis, gap_along(axis, box), barrier, vehicle)
         for p in range(circles.shape[0]):
             dx = x - circles[p, 0]
             dy = y - circles[p, 1]
-            near = reach + circles[p, 2]
-            if dx * dx + dy * dy < near * near:
+            within = reach + circles[p, 2]
+            if dx * dx + dy * dy < within * within:
                 first = scene.piece_starts[p]
                 last = scene.piece_starts[p + 1]
                 gap, _ = widest_gap(box, first, last, scene.edges, far)
@@ -146,9 +165,9 @@ def differentiate_nearness(
                     continue
                 gap, axis = widest_gap(box, first, last, scene.edges, far)
                 if not is_near:
-                    _differentiate_boxes(model, i, vehicle)
+                    _differentiate_boxes(near, i, vehicle)
                     is_near = True
-                cost += _add_gap(model, i, body, box, axis, gap, barrier, vehicle)
+                cost += _add_gap(near, i, body, box, axis, gap, barrier, vehicle)
     for h in range(FIRST_HITCH, size):
         hitch = states[i, h]
         value, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
@@ -173,48 +192,55 @@ def differentiate_nearness(
 
 
 @lean
-def _differentiate_boxes(model: Model, i: int, vehicle: Vehicle) -> None:
+def _differentiate_boxes(near: NearnessModel, i: int, vehicle: Vehicle) -> None:
     """Fill in how the bodies of state ``i`` change with speed, steering and hitch angles.
 
     How they move with the pose needs no buffer: all of them move and turn as one.
     """
-    nudged = model.nudged
-    size = numbers_of(model.states, vehicle)
+    nudged = near.nudged
+    size = numbers_of(near.states, vehicle)
     for c in range(size):
-        nudged[0, c] = model.states[i, c]
+        nudged[0, c] = near.states[i, c]
     bodies = swept_bodies(load(nudged, 0, vehicle), vehicle)
     for c in range(3, size):
         nudge = -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
         nudged[0, c] += nudge
         for body, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
             for n in range(6):
-                model.box_slopes[c, body, n] = (box[n] - bodies[body][n]) / nudge
-        nudged[0, c] = model.states[i, c]
+                near.box_slopes[c, body, n] = (box[n] - bodies[body][n]) / nudge
+        nudged[0, c] = near.states[i, c]
 
 
 @inlined
 def _add_gap(
-    model: Model, i: int, body: int, box: Box, axis: Axis, gap: float, barrier: Barrier, vehicle: Vehicle
+    near: NearnessModel,
+    i: int,
+    body: int,
+    box: Box,
+    axis: Axis,
+    gap: float,
+    barrier: Barrier,
+    vehicle: Vehicle,
 ) -> float:
     """Add what the gap (metres) of a body's box along an axis contributes; returns what it costs."""
     cost, slope, bend = nearness(gap - barrier.margin_m, barrier)
     if bend == 0.0:
         return cost
-    size = numbers_of(model.states, vehicle)
+    size = numbers_of(near.states, vehicle)
     by_box = gap_slope(axis, box)
-    by_state = model.vectors[0]
+    by_state = near.by_state
     by_state[0] = by_box[0]
     by_state[1] = by_box[1]
-    x = box[0] - model.states[i, 0]
-    y = box[1] - model.states[i, 1]
+    x = box[0] - near.states[i, 0]
+    y = box[1] - near.states[i, 1]
     by_state[2] = by_box[1] * x - by_box[0] * y + by_box[3] * box[2] - by_box[2] * box[3]
     for c in range(3, size):
         change = 0.0
         for n in range(6):
-            change += by_box[n] * model.box_slopes[c, body, n]
+            change += by_box[n] * near.box_slopes[c, body, n]
         by_state[c] = change
     for r in range(size):
-        model.gradient[i, r] += slope * by_state[r]
+        near.gradient[i, r] += slope * by_state[r]
         for c in range(size):
-            model.curvature[i, r, c] += bend * by_state[r] * by_state[c]
+            near.curvature[i, r, c] += bend * by_state[r] * by_state[c]
     return cost

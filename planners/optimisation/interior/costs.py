@@ -9,7 +9,7 @@ from planners.optimisation.arrival_error import aim_near, bend_of_error
 from planners.optimisation.gains import effort
 from planners.optimisation.gaps import Barrier
 from planners.optimisation.interior.buffers import LIMITED, Interior, limits_of, value_of
-from planners.optimisation.local_model import Model, differentiate_nearness, nearness_cost
+from planners.optimisation.local_model import Model, differentiate_nearness, nearness_cost, nearness_model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, MOST_TURN, RADIUS
@@ -151,6 +151,7 @@ def differentiate(
 ) -> None:
     """Fill in gaps and derivatives; ``longer`` is the vehicle with a step that is a little longer."""
     size = numbers_of(model.states, vehicle)
+    near = nearness_model(model)
     for k in range(steps):
         here = load(model.states, k, vehicle)
         first = model.controls[k, 0]
@@ -165,7 +166,7 @@ def differentiate(
             else:
                 model.gaps[k, c] = after[c] - model.states[k + 1, c]
                 interior.by_time[k, c] = (later[c] - after[c]) / (longer.dt - vehicle.dt)
-        differentiate_nearness(model, k + 1, vehicle, scene, circles, barrier)
+        differentiate_nearness(near, k + 1, vehicle, scene, circles, barrier)
     for r in range(size):
         model.gradient[0, r] = 0.0
         for c in range(size):
