@@ -11,7 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.optimisation.gaps import Barrier, circles_around
-from planners.optimisation.local_model import allocate_model, differentiate_nearness, nearness_cost
+from planners.optimisation.local_model import (
+    NearnessModel,
+    allocate_model,
+    differentiate_nearness,
+    nearness_cost,
+)
 from planners.world.geometry.collision import scene_of
 from planners.world.vehicles.dynamics import turn_limit
 from planners.world.vehicles.vehicle import state_size
@@ -42,7 +47,9 @@ def test_the_gradient_of_nearness_is_that_of_its_cost(name: str, lateral: float,
     state[:3] = *rng.uniform(2.0, 9.0, 2), rng.uniform(-3.0, 3.0)
     state[4] *= turn_limit(vehicle)
     model.states[1] = state
-    at_once = differentiate_nearness(model, 1, vehicle, SCENE, circles, BARRIER)
+    scratch = model.vectors[0], model.nudged, model.box_slopes
+    near = NearnessModel(model.states, model.gradient, model.curvature, *scratch)
+    at_once = differentiate_nearness(near, 1, vehicle, SCENE, circles, BARRIER)
     assert at_once == nearness_cost(model.states, 1, vehicle, SCENE, circles, BARRIER)
 
     def cost(number: int, more: float) -> float:
