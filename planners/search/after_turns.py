@@ -7,27 +7,23 @@ later arrivals in them do not count. Searches that begin after a turn have not b
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from planners.optimisation.polish import polish_quickest
-from planners.search.answer import Answer, best_of, with_work
+from planners.search.answer import FOR_SEARCHES, POLISHED, Answer, best_of, with_work
 from planners.search.first_turns import first_turns
 from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
-from planners.world.problem import Plan
 from planners.world.randomness import generator
 
-FOR_SEARCHES = 0.5  # of the seconds left: the rest is for the polish
 BEFORE_POLISH = 1.05  # times what the best drive costs: so much may one cost that is not polished yet
-POLISHED = 2  # of the cheapest drives
 
 
-def after_turns(
-    planner: str, query: Query, seed: int, best: Answer, plan: Plan, expansions: int, until: float
-) -> Answer:
+def after_turns(planner: str, query: Query, seed: int, best: Answer, expansions: int, until: float) -> Answer:
     """Look for a cheaper drive than an answer's among those that begin with a turn.
 
     Args:
@@ -35,7 +31,6 @@ def after_turns(
         query: what it is asked, from a start without a prefix.
         seed: of the searches.
         best: the answer so far.
-        plan: its plan.
         expansions: of the search from each of the ``first_turns``, at most.
         until: when to end, by ``working_clock``.
 
@@ -44,7 +39,8 @@ def after_turns(
     """
     problem, vehicle = query.problem, query.vehicle
     around = vehicle, query.scene, query.workspace
-    bound_s = BEFORE_POLISH * cost_of(plan, vehicle)
+    plan = best[0].plan
+    bound_s = math.inf if plan is None else BEFORE_POLISH * cost_of(plan, vehicle)
     found: list[Outcome] = []
     for number, turn in enumerate(first_turns(problem, vehicle, query.scene)):
         left = min(expansions, query.limits.expansions), FOR_SEARCHES * (until - working_clock())

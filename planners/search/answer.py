@@ -11,6 +11,9 @@ from planners.world.driving_cost import cost_of
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 
+FOR_SEARCHES = 0.5  # of the seconds left, for each further search: the rest is for the polish
+POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
+
 Answer = tuple[Outcome, Plan | None]  # of a search, its plan polished; and what that was before
 
 

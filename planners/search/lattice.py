@@ -143,14 +143,8 @@ class _LatticeSearch:
         coarse = self._levels[min(self._tried, len(self._levels) - 1)]
         self._level = paced(coarse, vehicle, settings.sharpest)
         self._tried += 1
-        if trial == 0 and self._manoeuvring is None:
-            level = self._level
-            expected_s = expected_seconds(tree.states, self._ahead, level.heading_s, level.late_s, vehicle)
-            if self._ahead.table is not NO_TABLE:
-                expected_s *= settings.pose_longer
-            elif self._winds:  # through walls, maybe
-                expected_s = min(expected_s, settings.winding * self._straight / vehicle.max_speed)
-            self._expected_s = expected_s
+        if trial == 0:
+            self._expected_s = self._expected(tree)
         if self._improving:
             self._level = varied(self._level, settings.improving_greed, query)
         begin_lattice(tree, self._frontier, self._ahead, self._level, vehicle)
@@ -166,11 +160,21 @@ class _LatticeSearch:
         metres = way_from(tree.states, go, query.vehicle)[0]
         self._winds = metres > settings.winding * self._straight + settings.winding_m
         if suits(goal, query.vehicle):
-            manoeuvring = Manoeuvring(query, goal, cells)
-            self._manoeuvring = manoeuvring
-            self._expected_s = settings.pose_longer * manoeuvring.least_seconds
+            self._manoeuvring = manoeuvring = Manoeuvring(query, goal, cells)
             if query.endings is not None:
                 self._joining = manoeuvring.joining(query, query.endings)
+
+    def _expected(self, tree: trees.Tree) -> float:
+        """How long a drive should take, in seconds, by the way over the cells and the first level."""
+        vehicle, settings, level = self._query.vehicle, self._settings, self._level
+        if self._manoeuvring is not None:
+            return settings.pose_longer * self._manoeuvring.least_seconds
+        seconds = expected_seconds(tree.states, self._ahead, level.heading_s, level.late_s, vehicle)
+        if self._ahead.table is not NO_TABLE:
+            return settings.pose_longer * seconds
+        if self._winds:  # through walls, maybe
+            return min(seconds, settings.winding * self._straight / vehicle.max_speed)
+        return seconds
 
     def _grow(self, tree: trees.Tree, goal: Floats, until: int) -> None:
         """Drive primitives, and by turns look for manoeuvres, if any lead to the goal."""

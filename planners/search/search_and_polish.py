@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from planners.optimisation.polish import polish, polish_quickest
 from planners.search.after_turns import after_turns
-from planners.search.answer import Answer, best_of, with_work
+from planners.search.answer import FOR_SEARCHES, POLISHED, Answer, best_of, with_work
 from planners.search.anytime import asking_for_kinds, improve
 from planners.search.manoeuvres.forward_arrivals import arrive_forwards
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
@@ -31,9 +31,7 @@ SHORTER = 0.9  # of what the cheapest plan so far costs: so much may the next on
 AGAIN = 1000  # expansions of each further search at least
 AS_MANY = 8  # times the expansions of the first search: so many has each further one
 MOST_AGAIN = 8000  # expansions of each further search at most
-FOR_AGAIN = 0.5  # of the seconds left: the rest is for the polish
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 # Another planner, asked where nothing is found, the way winds, or a drive to a pose is late:
 SECOND = {"lattice": "follow"}  # which one
@@ -71,8 +69,9 @@ def search_and_polish(
     first search took, the worse its plan mostly is, and the longer they may take. Where nothing is found, the
     way winds, or a drive to a pose takes longer than expected, another planner is asked as well; or to a pose
     that is far, for a drive to its place and on from there. If the answer still takes much longer than the
-    planner expected, it is improved for as long as that is worth. A given plan may be of a worse kind than
-    what the planner finds, so it searches as if there were none, but at first not for long.
+    planner expected, one to a place is looked for ``after_turns``, and it is improved for as long as that is
+    worth. A given plan may be of a worse kind than what the planner finds, so it searches as if there were
+    none, but at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -155,7 +154,7 @@ def _searched_and_polished(
     else:
         if asks_others and query.prefix is None:
             worth = AFTER_TURN * too_long_s
-            answer, rough = after_turns(planner, query, seed, (answer, rough), plan, int(worth), until)
+            answer, rough = after_turns(planner, query, seed, (answer, rough), int(worth), until)
         worth = A_SECOND * max(_takes((answer, rough)) - expected_s, 0.0)
     answer, anew = _improved(planner, query, seed, answer, int(worth), until)
     return answer, anew or rough
@@ -199,7 +198,7 @@ def _first_answer(
         limits = replace(
             query.limits,
             expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
-            seconds=FOR_AGAIN * (until - working_clock()),
+            seconds=FOR_SEARCHES * (until - working_clock()),
             bound_s=min(SHORTER * least_s, query.limits.bound_s),
         )
         if min(limits.expansions, limits.seconds) <= 0.0:

@@ -94,8 +94,8 @@ def test_a_car_that_looks_away_from_its_way_turns_round_first_where_that_is_quic
 
 
 @pytest.mark.parametrize("vehicle", [CAR, CAR_1_TRAILER])
-def test_no_answer_gets_longer_by_it(vehicle: Vehicle) -> None:
-    """By mean: the improvement that follows has less work where turns have helped."""
+def test_drives_to_places_are_no_longer_by_mean_for_it(vehicle: Vehicle) -> None:
+    """A single one may be: the improvement that follows has less work where turns have helped."""
     without, answers = [], []
     for number in range(8):
         drawn = through_doors(np.random.default_rng([603, number]), vehicle, pose=False)
