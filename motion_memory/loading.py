@@ -21,7 +21,7 @@ from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import families_of, family
 from planners.world.geometry.collision import scene_of
-from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, start_state
+from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, start_state
 from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_memory_or_library, vehicle_of
@@ -110,15 +110,21 @@ def _warmed(ready: Memory) -> Memory:
     bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
     aside = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
 
-    def ask(planner: Memory, obstacle: Floats = aside, arrival: Arrival | None = None) -> None:
-        around = start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale
-        planner.plan_arrays(*around, arrival=arrival)
+    def ask(
+        planner: Memory,
+        obstacle: Floats = aside,
+        arrival: Arrival | None = None,
+        current: Plan | None = None,
+    ) -> Plan | None:
+        around = goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale
+        begin = start if current is None else (0.0, 1e-3 * scale, start[2])
+        return planner.plan_arrays(begin, *around, arrival=arrival, current=current).plan
 
     library = ready.stored.library if isinstance(ready.stored, StoredMemory) else ready.stored
 
     alone = replace(ready, assist="none")
     for each in (ready, alone):  # recall, then search
-        ask(each)
+        ask(each, current=ask(each))  # and again from beside the plan
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
     for name in families_of(ready.vehicle)[:1]:  # there is none for a vehicle that cannot drive backwards
         narrow = replace(family(name, "easy", ready.vehicle).draw(0, 0), scale=scale)

@@ -7,15 +7,19 @@ left of its plan is an answer, too, and only a cheaper one replaces it.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 
-from planners.optimisation.descent import steps_to_goal
-from planners.optimisation.polish import polish, polish_guesses
+from planners.optimisation.descent import arrives, steps_to_goal
+from planners.optimisation.following import follow
+from planners.optimisation.local_model import allocate_model
+from planners.optimisation.polish import ROOM, polish, polish_guesses
 from planners.search.braking import is_free_drive
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
@@ -26,6 +30,7 @@ from planners.world.workspace import Workspace
 
 OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and shares of full speed together
 ROUNDING: Final = 1e-9  # on limits, m/s and radians
+LATER: Final = (0, 2, 5)  # steps by which a drive along a plan may reach the goal later than the plan
 SAME: Final = 1e-6  # metres, m/s and radians: a robot that is off by no more drives the same controls on
 
 
@@ -64,10 +69,41 @@ def rest_of(
             return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
     if len(controls) == 0:
         return None
-    guess, around = Plan(states, controls, vehicle.dt), (vehicle, scene, workspace)
+    around = vehicle, scene, workspace
+    left = Plan(current.states[nearest:], controls, vehicle.dt)
+    along = _driven_along(left, start, goal, vehicle, workspace)
     if not problem.asks_for_pose:  # this keeps some centimetres off obstacles, where that costs little
-        return polish(problem, guess, *around, seconds=until - working_clock()).plan
-    return polish_guesses(problem, [guess], *around, until)[1].plan
+        return polish(problem, along, *around, seconds=until - working_clock()).plan
+    better = polish_guesses(problem, [along], *around, until)[1].plan
+    arrived = arrives(along.states[-1], goal, vehicle) and is_free_drive(along.states, vehicle, scene)
+    plans = [each for each in (better, along if arrived else None) if each is not None]
+    return min(plans, key=lambda each: cost_of(each, vehicle), default=None)
+
+
+def _driven_along(plan: Plan, start: Floats, goal: Floats, vehicle: Vehicle, workspace: Workspace) -> Plan:
+    """Drive along a plan from a state ``start [S]`` beside it, up to where the plan reaches the goal.
+
+    The drive may be blocked, and need not reach the goal.
+    """
+    reached = int(steps_to_goal(plan.states, len(plan.controls), goal, vehicle))
+    most, last = control_limits(vehicle), reached if reached >= 0 else len(plan.controls)
+    turns = start[2] - plan.states[0, 2]
+    turns -= math.remainder(turns, math.tau)
+    for later in LATER if reached >= 0 else (0,):
+        steps = last + later
+        model = workspace.buffers(allocate_model, ROOM * (1 + steps // ROOM), len(start))
+        model.states[: last + 1] = plan.states[: last + 1]
+        model.states[last + 1 : steps + 1] = plan.states[last]
+        model.states[: steps + 1, 2] += turns
+        model.states[0] = start
+        model.controls[:last] = plan.controls[:last]
+        model.controls[last:steps] = 0.0
+        follow(model, steps, goal, vehicle)
+        controls = np.clip(model.tried_controls[:steps], np.negative(most), most)
+        along = Plan(simulate(start, controls, vehicle), controls, vehicle.dt)
+        if arrives(along.states[-1], goal, vehicle):
+            break
+    return along
 
 
 def fits(current: Plan, vehicle: Vehicle) -> bool:

@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from planners.current_plan import rest_of
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.doors import Doors
 from planners.routes.free_nearby import free_nearby
+from planners.routes.kept_route import kept_route
 from planners.routes.leg_search import LATE, LegSearch, Solve
 from planners.routes.legs import Leg, polished_legs
 from planners.routes.path_ahead import PathAhead, Stop
@@ -109,7 +109,11 @@ class Router:
         if refused is not None:
             return refused
         problems, state = self._problems(start, stops, motion), self._state(start, motion)
-        kept = None if current is None else self._kept(current, problems, state, until)
+        kept = None
+        if current is not None:
+            around = self._vehicle, self._scene, self._workspace
+            half = math.inf if time_limit is None else until - 0.5 * time_limit
+            kept = kept_route(current, problems, around, self._polishes, half)
         found = self._searched(problems, stops, state, until)
         if kept is None or (isinstance(found, Route) and self._cost(found) < self._cost(kept)):
             return found
@@ -117,24 +121,6 @@ class Router:
 
     def _cost(self, route: Route) -> float:
         return cost_of(route.plan(self._vehicle), self._vehicle)
-
-    def _kept(self, current: Plan, problems: Sequence[Problem], state: Floats, until: float) -> Route | None:
-        """What is left of a plan from a ``state [S]`` on, if it leads through all stops."""
-        asked: list[Problem] = []
-        sections: list[list[Leg]] = []
-        paths = []
-        for to_stop in problems:
-            problem = starting_at(to_stop, state)
-            rest = rest_of(current, problem, self._vehicle, self._scene, self._workspace, until)
-            if rest is None:
-                return None
-            steps = len(rest.controls)
-            leg = Leg(rest.states[0], rest.states[-1], rest.controls, steps, None, problem, problem.goal)
-            asked.append(problem)
-            sections.append([leg] if steps else [])
-            paths.append(rest.states[:, :2])
-            state = rest.states[-1]
-        return Route(asked, sections, paths)
 
     def _searched(
         self, problems: list[Problem], stops: Sequence[Stop], state: Floats, until: float

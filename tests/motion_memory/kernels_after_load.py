@@ -61,7 +61,11 @@ if __name__ == "__main__":
     before = ready(kernels)
     print(f"{before.total()} kernels")
     for question in asked:
-        memory.plan(question)
+        plan = memory.plan(question).plan
+        if plan is not None:
+            x, y, *motion = plan.states[len(plan.controls) // 3].tolist()
+            beside = replace(question, start=(x + 1e-3, y, motion[0]), start_motion=tuple(motion[1:]))
+            memory.plan(beside, current=plan)
         after = ready(kernels)
         if new := after - before:
             print(question.id, *new)

@@ -96,6 +96,22 @@ def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> Non
     assert found >= 0.8 * len(range(0, len(plan.states) - 1, 5))
 
 
+@settings(deadline=None, max_examples=24)
+@given(CASES, st.floats(0.0, 0.7), st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.01, 0.01))
+def test_where_nothing_is_in_the_way_who_is_beside_a_plan_drives_on_without_any_time(
+    case: tuple[str, Vehicle], share: float, x: float, y: float, turn: float
+) -> None:
+    (kind, vehicle), plan = case, first_plan(*case)
+    at = int(share * (len(plan.states) - 1))
+    state = plan.states[at].copy()
+    state[:3] += (x, y, turn)
+    problem = replace(seen_from(state, ASKED[kind]), obstacles=obstacles_of([]))
+    rest = rest_of(plan, problem, vehicle, scene_of(problem), WORKSPACE, -math.inf)
+    assert rest is not None
+    assert faults(problem, rest, vehicle) == []
+    assert rest.duration_s <= plan.dt * (len(plan.controls) - at) + 0.5
+
+
 @pytest.mark.parametrize("kind", ["place", "pose"])
 def test_a_blocked_plan_is_left(kind: str) -> None:
     plan = first_plan(kind, CAR)

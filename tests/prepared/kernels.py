@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from planners.current_plan import rest_of
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.retiming import retimed
 from planners.optimisation.polish import driven_near, polish
@@ -36,6 +37,9 @@ def compile_arrivals(vehicle: Vehicle) -> None:
     scene, workspace = scene_of(asked), Workspace()
     polish(asked, found, vehicle, scene, workspace)
     driven_near(asked, retimed(found, vehicle, vehicle), vehicle, scene, workspace)
+    rest_of(
+        found, replace(asked, start=(*asked.start[:2], asked.start[2] + 1e-3)), vehicle, scene, workspace, 0.0
+    )
     first_turns(asked, vehicle, scene)
 
 

@@ -1,0 +1,76 @@
+"""What is left of a route that a robot drives now, from where the robot is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from planners.current_plan import rest_of
+from planners.routes.legs import Leg, joined, polished_legs
+from planners.routes.route import Route
+from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
+from planners.world.geometry.collision import Scene
+from planners.world.problem import Plan, Problem, starting_at
+from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
+
+Around = tuple[Vehicle, Scene, Workspace]
+
+
+def kept_route(
+    current: Plan, problems: Sequence[Problem], around: Around, polishes: bool, until: float
+) -> Route | None:
+    """Drive what is left of a plan through some stops.
+
+    First comes what leads to all stops at once, so that there is a route in however short a time. Then each
+    drive is polished, and those behind it begin where it ends.
+
+    Args:
+        current: the plan.
+        problems: to each stop, from where the robot is.
+        around: what is driven, all that is occupied, and the caller's buffers.
+        polishes: whether drives are polished.
+        until: when to end, by ``working_clock``.
+
+    Returns:
+        The route; None if no free drive near what is left of the plan leads through all stops.
+    """
+    legs = _near([current] * len(problems), problems, around, until)
+    if legs is None:
+        return None
+    vehicle = around[0]
+    for number in range(len(legs) if polishes else 0):
+        before = legs[number:]
+        [better] = polished_legs(before[0].problem, before[:1], *around, until - working_clock())
+        if better is before[0]:
+            continue
+        moved = [starting_at(each, better.end) for each in problems[number + 1 :]]
+        behind = _near([_plan(leg, vehicle) for leg in before[1:]], moved, around, until)
+        if behind is not None and _cost([better, *behind], vehicle) <= _cost(before, vehicle):
+            legs[number:] = [better, *behind]
+    paths = [leg.states(vehicle)[:, :2] for leg in legs]
+    return Route([leg.problem for leg in legs], [[leg] if leg.driving else [] for leg in legs], paths)
+
+
+def _near(
+    plans: Sequence[Plan], problems: Sequence[Problem], around: Around, until: float
+) -> list[Leg] | None:
+    """A leg near each of the ``plans`` that solves its problem, each from where the one before ends."""
+    legs: list[Leg] = []
+    for plan, to_stop in zip(plans, problems, strict=True):
+        problem = starting_at(to_stop, legs[-1].end) if legs else to_stop
+        rest = rest_of(plan, problem, *around, -math.inf) or rest_of(plan, problem, *around, until)
+        if rest is None:
+            return None
+        steps = len(rest.controls)
+        legs.append(Leg(rest.states[0], rest.states[-1], rest.controls, steps, None, problem, problem.goal))
+    return legs
+
+
+def _plan(leg: Leg, vehicle: Vehicle) -> Plan:
+    return Plan(leg.states(vehicle), leg.controls, vehicle.dt)
+
+
+def _cost(legs: Sequence[Leg], vehicle: Vehicle) -> float:
+    return cost_of(joined(legs[0].problem, legs, vehicle), vehicle)
