@@ -31,7 +31,7 @@ from planners.world.alignment import (
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle, name_of
+from planners.world.vehicles.vehicle import Vehicle, in_short_steps, name_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
@@ -96,7 +96,9 @@ class Memory:
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        return self._planned(self._read(problem), began, time_limit, improve_seconds, current)
+        return self._planned(
+            self._read(problem, self._seen_by(current)), began, time_limit, improve_seconds, current
+        )
 
     def plan_arrays(
         self,
@@ -145,7 +147,7 @@ class Memory:
         began = perf_counter()
         problem = problem_of_arrays(
             *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
-            vehicle=self.vehicle,
+            vehicle=self._seen_by(current),
         )
         return self._planned(problem, began, time_limit, improve_seconds, current)
 
@@ -203,7 +205,7 @@ class Memory:
             raise ValueError(f"k is {k!r}: give a whole number, 1 or more")
         if self.stored is None:
             raise UsageError("Nothing can be recalled without a memory: name one where you call load.")
-        read = self._read(problem)
+        read = self._read(problem, self.vehicle)
         fault = scale_fault(self.stored, read.scale)
         if fault is not None:
             raise ValueError(fault)
@@ -225,7 +227,7 @@ class Memory:
             ValueError: The problem is malformed or impossible.
         """
         check_plan("plan", plan)
-        read = self._read(problem)
+        read = self._read(problem, self.vehicle)
         return faults(read, to_problem_frame(plan, read), self.vehicle)
 
     def learn(self, answers: Answer | RouteAnswer | Iterable[Answer | RouteAnswer], data: str | Path) -> int:
@@ -266,14 +268,18 @@ class Memory:
                 solved.append(Solved(problem, check_attempt(problem, attempt, set(), vehicle)))
         return remember(Path(data), solved, self.vehicle)
 
-    def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
+    def _seen_by(self, current: Plan | None) -> Vehicle:
+        """The vehicle for which the start must be free: one that drives may be near what it passes."""
+        return self.vehicle if current is None else in_short_steps(self.vehicle)
+
+    def _read(self, given: Problem | Mapping[str, Any] | str, vehicle: Vehicle) -> Problem:
         """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
         if isinstance(given, Problem):
             return given
         fields = _parsed(given) if isinstance(given, str) else given
         with suppress(ValueError):  # most hold what JSON holds, and need no second look
-            return problem_of(fields, "problem", self.vehicle)
-        return problem_of(plain(fields), "problem", self.vehicle)
+            return problem_of(fields, "problem", vehicle)
+        return problem_of(plain(fields), "problem", vehicle)
 
     def _planned(
         self,

@@ -16,7 +16,7 @@ from planners.optimisation.descent import arrives, steps_to_goal
 from planners.optimisation.following import follow
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import ROOM, polish, polish_guesses
-from planners.search.braking import is_free_drive
+from planners.search.braking import is_free_closely
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
@@ -65,17 +65,19 @@ def rest_of(
     states = simulate(start, controls, vehicle)
     if np.abs(differences[nearest]).max() <= SAME and _is_within_limits(states, vehicle):
         steps = int(steps_to_goal(states, len(controls), goal, vehicle))
-        if steps >= 0 and is_free_drive(states[: steps + 1], vehicle, scene):
-            return Plan(states[: steps + 1], controls[:steps].copy(), vehicle.dt)
+        rest = Plan(states[: steps + 1], controls[: max(steps, 0)].copy(), vehicle.dt)
+        if steps >= 0 and is_free_closely(rest, vehicle, scene):
+            return rest
     if len(controls) == 0:
         return None
     around = vehicle, scene, workspace
     left = Plan(current.states[nearest:], controls, vehicle.dt)
     along = _driven_along(left, start, goal, vehicle, workspace)
-    if not problem.asks_for_pose:  # this keeps some centimetres off obstacles, where that costs little
-        return polish(problem, along, *around, seconds=until - working_clock()).plan
-    better = polish_guesses(problem, [along], *around, until)[1].plan
-    arrived = arrives(along.states[-1], goal, vehicle) and is_free_drive(along.states, vehicle, scene)
+    if problem.asks_for_pose:
+        better = polish_guesses(problem, [along], *around, until)[1].plan
+    else:  # this keeps some centimetres off obstacles, where that costs little
+        better = polish(problem, along, *around, seconds=until - working_clock()).plan
+    arrived = arrives(along.states[-1], goal, vehicle) and is_free_closely(along, vehicle, scene)
     plans = [each for each in (better, along if arrived else None) if each is not None]
     return min(plans, key=lambda each: cost_of(each, vehicle), default=None)
 

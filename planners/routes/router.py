@@ -106,14 +106,15 @@ class Router:
         """
         until = math.inf if time_limit is None else working_clock() + time_limit
         refused = self.refusal(start, stops, motion)
-        if refused is not None:
-            return refused
         problems, state = self._problems(start, stops, motion), self._state(start, motion)
         kept = None
         if current is not None:
             around = self._vehicle, self._scene, self._workspace
             half = math.inf if time_limit is None else until - 0.5 * time_limit
-            kept = kept_route(current, problems, around, self._polishes, half)
+            polished_until = half if refused is None else -math.inf
+            kept = kept_route(current, problems, around, self._polishes, polished_until)
+        if refused is not None:  # a robot that drives may be within the margins of what it passes
+            return kept or refused
         found = self._searched(problems, stops, state, until)
         if kept is None or (isinstance(found, Route) and self._cost(found) < self._cost(kept)):
             return found

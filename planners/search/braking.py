@@ -10,7 +10,7 @@ from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import control_limits, simulate
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import SHORT_STEPS, Vehicle, in_short_steps
 
 
 def braking(state: Floats, vehicle: Vehicle) -> Floats:
@@ -47,6 +47,24 @@ def free_stop(state: Floats, vehicle: Vehicle, scene: Scene) -> Plan | None:
 def is_free_drive(states: Floats, vehicle: Vehicle, scene: Scene) -> bool:
     """Whether a drive ``states [T, S]`` is free, including the steps between the states."""
     return bool(count_free_prefix(states, vehicle, scene) == len(states))
+
+
+def is_free_closely(plan: Plan, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether a drive is free if it is looked at closely where it passes obstacles within the usual margins.
+
+    Those keep what moves between two states off obstacles that neither state meets. In short steps they are
+    smaller. Not for vehicles of the first order, whose controls depend on the step.
+    """
+    states, short, last, at = plan.states, in_short_steps(vehicle), len(plan.controls), 0
+    while (at := at + int(count_free_prefix(states[at:], vehicle, scene))) <= last:
+        if vehicle.first_order:
+            return False
+        for step in range(max(at - 1, 0), min(at + 1, last)):
+            within = simulate(states[step], np.tile(plan.controls[step], (SHORT_STEPS, 1)), short)
+            if not is_free_drive(within, short, scene):
+                return False
+        at += 1
+    return last > 0 or is_free_drive(states, short, scene)
 
 
 def _ramp(change: float, rate: float, dt: float) -> Floats:

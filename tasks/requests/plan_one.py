@@ -11,7 +11,7 @@ from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, in_canonical, to_canonical
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, in_short_steps
 from storage.exchange.plans import read_plan
 from storage.exchange.problems import read_problem
 from storage.places.data_folder import open_data_folder
@@ -76,7 +76,8 @@ def plan_one(
     """
     read = [file, *assistant.files, *([] if current is None else [current])]
     check_plan_outputs(read, out, drawing)
-    problem = read_problem(file, assistant.vehicle, pick)
+    near = assistant.vehicle if current is None else in_short_steps(assistant.vehicle)
+    problem = read_problem(file, near, pick)  # who drives may be near what it passes
     current_plan = None if current is None else _current_plan(current, problem, assistant.vehicle)
     if learn is not None:
         open_data_folder(learn)

@@ -17,7 +17,7 @@ from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Arrival, Plan, Problem, obstacles_of
-from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle, name_of
 from planners.world.workspace import Workspace
 from tests.worlds import box
 
@@ -110,6 +110,22 @@ def test_where_nothing_is_in_the_way_who_is_beside_a_plan_drives_on_without_any_
     assert rest is not None
     assert faults(problem, rest, vehicle) == []
     assert rest.duration_s <= plan.dt * (len(plan.controls) - at) + 0.5
+
+
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER], ids=name_of)
+def test_a_robot_within_the_margins_of_a_post_drives_on_unless_it_meets_it(vehicle: Vehicle) -> None:
+    problem = replace(PLACE, start=(0.0, 4.0, 0.0), goal=(30.0, 4.0), obstacles=obstacles_of([]))
+    plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+    assert plan is not None
+    state = plan.states[len(plan.states) // 2]
+    for gap, status in ((0.01, "solved"), (-0.01, "start-blocked")):
+        post = box(float(state[0]) + 0.3, 4.0 + 0.5 * vehicle.width + gap + 0.1, 0.0, 0.1, 0.1)
+        there = replace(seen_from(state, problem), obstacles=obstacles_of([[post]]))
+        assert solve(there, "lattice", vehicle=vehicle, workspace=WORKSPACE).status == "start-blocked"
+        answer = solve(there, "lattice", vehicle=vehicle, workspace=WORKSPACE, current=plan)
+        assert answer.status == status
+        if answer.plan is not None:
+            assert faults(there, answer.plan, vehicle) == []
 
 
 @pytest.mark.parametrize("kind", ["place", "pose"])

@@ -111,6 +111,7 @@ class CarWithTrailers(NamedTuple):
 
 Vehicle = Car | DifferentialDrive | CarWithTrailers
 MOST_TRAILERS = 3
+SHORT_STEPS: Final = 4  # into which a step is cut to look at it closely
 FIRST_HITCH: Final = 5  # index into a state: hitch angles follow x, y, heading, speed and turning
 
 CAR = Car()
@@ -122,6 +123,11 @@ VEHICLES: dict[str, Vehicle] = {
     vehicle.about.name.decode(): vehicle
     for vehicle in (CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER, CAR_2_TRAILERS)
 }
+
+
+def in_short_steps(vehicle: Vehicle) -> Vehicle:
+    """The vehicle in steps so short that its margins hardly count, for drives that are looked at closely."""
+    return vehicle._replace(dt=vehicle.dt / SHORT_STEPS)
 
 
 def name_of(vehicle: Vehicle) -> str:

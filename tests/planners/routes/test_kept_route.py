@@ -47,8 +47,6 @@ def test_a_robot_beside_its_route_goes_on_without_any_time_to_search(vehicle: Ve
         state[:3] += off * rng.normal(size=3)
         start, motion = tuple(state[:3].tolist()), tuple(state[3:].tolist())
         left = STOPS[sum(end <= at for end in ends) :]
-        if router.refusal(start, left, motion) is not None:
-            continue
         asked += 1
         route = router.route(start, left, motion, time_limit=1e-9, current=plan)
         if isinstance(route, Route):
