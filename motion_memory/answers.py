@@ -25,6 +25,7 @@ class Answer:
         float  # of the whole call, reading and checking the problem included, but not judging the plan
     )
     _found: tuple[Found, ...] = field(default=(), repr=False)  # nothing if the plan is the memory's
+    near_current: bool | None = None  # whether the robot is near its current plan; None: none was given
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,3 +39,4 @@ class RouteAnswer:
     local_plans: int  # how many were looked for
     planning_seconds: float  # of the whole search, in which the judge looks at each local plan
     _found: tuple[Found, ...] = field(default=(), repr=False)  # the local plans of the drive
+    near_current: bool | None = None  # as of ``Answer``

@@ -10,6 +10,7 @@ import numpy as np
 from motion_memory.answers import RouteAnswer
 from motion_memory.array_problems import motion_given, numbers_given
 from motion_memory.given_plans import current_plan
+from planners.current_plan import is_near
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.leg_search import Solve
 from planners.routes.router import Router
@@ -126,21 +127,27 @@ class MapRouter:
         check_options(stops, for_poses, {"goal_radius": goal_radius is not None}, "a goal")
         motion = checked_motion(motion_given("start_motion", start_motion), self._vehicle, scale)
         x, y, heading = self._world.grid_pose(x, y, heading)
+        begin = (x / scale, y / scale, heading)
         check_time_limit(time_limit, "time_limit")
-        driven = None if current is None else self._in_grid(current)
+        driven: Plan | None = None
+        near: bool | None = None
+        if current is not None:
+            driven = self._in_grid(current)
+            near = is_near(driven, self._router.state(begin, motion), self._vehicle)
         self._solver.seconds.clear()
         began = working_clock()
-        route = self._router.route((x / scale, y / scale, heading), stops, motion, time_limit, driven)
+        route = self._router.route(begin, stops, motion, time_limit, driven)
         seconds = working_clock() - began
         if isinstance(route, Stuck):
             why = route.told(self._world, scale)
-            return RouteAnswer("stuck", None, None, why, len(self._solver.seconds), seconds)
+            return RouteAnswer("stuck", None, None, why, len(self._solver.seconds), seconds, (), near)
         plan = route.plan(self._vehicle)
         if self._judged:
             check_route(route, plan, self._vehicle, self._seed)
         answer = scaled(in_frame_of(self._world, plan, scale), scale)
         found = tuple((*each, self._vehicle) for each in route.new_attempts(scale))
-        return RouteAnswer("solved", route.source, answer, None, len(self._solver.seconds), seconds, found)
+        local_plans = len(self._solver.seconds)
+        return RouteAnswer("solved", route.source, answer, None, local_plans, seconds, found, near)
 
     def _in_grid(self, current: Plan) -> Plan:
         """A plan in the map's frame, in canonical metres of its grid. Raises UsageError if it is none."""

@@ -15,6 +15,7 @@ from motion_memory.extras import may_lack
 from motion_memory.given_plans import check_plan, current_plan
 from motion_memory.plain import plain
 from planners.attempt import NEW, Attempt
+from planners.current_plan import is_near
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
@@ -30,7 +31,7 @@ from planners.world.alignment import (
 )
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
-from planners.world.problem import BOUNDS, Arrival, Plan, Problem
+from planners.world.problem import BOUNDS, Arrival, Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle, in_short_steps, name_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
@@ -293,9 +294,11 @@ class Memory:
         canonical, alignment = to_canonical(problem)
         limits = usual_limits(canonical, time_limit)
         driven: Plan | None = None
+        near: bool | None = None
         if current is not None:
-            near = to_problem_frame(current_plan(current, self.vehicle), problem)
-            driven = in_canonical(near, alignment)
+            left = to_problem_frame(current_plan(current, self.vehicle), problem)
+            driven = in_canonical(left, alignment)
+            near = is_near(driven, start_state(canonical, self.vehicle), self.vehicle)
         with self._workspace() as workspace:
             attempt = self._attempt(canonical, limits, workspace, self.assist, driven)
             if improve_seconds > 0.0:
@@ -305,7 +308,7 @@ class Memory:
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
         found = ((canonical, attempt, self.vehicle),) if attempt.source in NEW else ()
-        return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found)
+        return Answer(problem.id, attempt.status, attempt.source, plan, *spent, found, near)
 
     def _attempt(
         self,

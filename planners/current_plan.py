@@ -55,15 +55,13 @@ def rest_of(
         free and leads to the goal.
     """
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
-    differences = _differences(current.states, start)
-    off = _off(differences, vehicle)
-    nearest = len(off) - 1 - int(off[::-1].argmin())  # the last of those where it stands
-    if off[nearest] > OFF:
+    nearest, apart = _nearest(current, start, vehicle)
+    if _off(apart, vehicle) > OFF:
         return None
     most = control_limits(vehicle)  # which may be lower than when the plan was made
     controls = np.clip(current.controls[nearest:], np.negative(most), most)
     states = simulate(start, controls, vehicle)
-    if np.abs(differences[nearest]).max() <= SAME and _is_within_limits(states, vehicle):
+    if np.abs(apart).max() <= SAME and _is_within_limits(states, vehicle):
         steps = int(steps_to_goal(states, len(controls), goal, vehicle))
         rest = Plan(states[: steps + 1], controls[: max(steps, 0)].copy(), vehicle.dt)
         if steps >= 0 and is_free_closely(rest, vehicle, scene):
@@ -108,6 +106,11 @@ def _driven_along(plan: Plan, start: Floats, goal: Floats, vehicle: Vehicle, wor
     return along
 
 
+def is_near(current: Plan, state: Floats, vehicle: Vehicle) -> bool:
+    """Whether a robot in a ``state [S]`` is near enough to its plan to drive what is left of it."""
+    return bool(_off(_nearest(current, state, vehicle)[1], vehicle) <= OFF)
+
+
 def fits(current: Plan, vehicle: Vehicle) -> bool:
     """Whether states and steps of a plan are those of a vehicle."""
     states, controls = current.states, current.controls
@@ -119,18 +122,20 @@ def fits(current: Plan, vehicle: Vehicle) -> bool:
     )
 
 
-def _differences(states: Floats, state: Floats) -> Floats:
-    """Each of ``states [T, S]`` less a state ``[S]``; headings may differ by whole turns besides."""
-    differences: Floats = states - state
+def _nearest(current: Plan, state: Floats, vehicle: Vehicle) -> tuple[int, Floats]:
+    """The last of a plan's states that are nearest to a ``state [S]``, and by what it differs ``[S]``."""
+    differences = current.states - state
     differences[:, 2] = all_wrapped(differences[:, 2])
-    return differences
+    off = _off(differences, vehicle)
+    nearest = len(off) - 1 - int(off[::-1].argmin())
+    return nearest, differences[nearest]
 
 
 def _off(differences: Floats, vehicle: Vehicle) -> Floats:
-    """How much each of the ``differences [T, S]`` is: lengths, radians and shares of full speed together."""
-    away = np.hypot(differences[:, 0], differences[:, 1]) / (vehicle.front + vehicle.rear)
-    faster = np.abs(differences[:, 3]) / vehicle.max_speed
-    off: Floats = away + faster + np.abs(differences[:, [2, *range(4, differences.shape[1])]]).sum(axis=1)
+    """How large ``differences [..., S]`` are: lengths, radians and shares of full speed together."""
+    x, y, turn, speed, *others = np.moveaxis(differences, -1, 0)
+    away, faster = np.hypot(x, y) / (vehicle.front + vehicle.rear), np.abs(speed) / vehicle.max_speed
+    off: Floats = away + faster + np.abs(turn) + np.abs(others).sum(axis=0)
     return off
 
 

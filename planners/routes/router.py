@@ -106,7 +106,7 @@ class Router:
         """
         until = math.inf if time_limit is None else working_clock() + time_limit
         refused = self.refusal(start, stops, motion)
-        problems, state = self._problems(start, stops, motion), self._state(start, motion)
+        problems, state = self._problems(start, stops, motion), self.state(start, motion)
         kept = None
         if current is not None:
             around = self._vehicle, self._scene, self._workspace
@@ -175,7 +175,7 @@ class Router:
 
     def refusal(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Stuck | None:
         """Why start or goals cannot be used, if so; arguments as of ``route``."""
-        state = self._state(start, motion)
+        state = self.state(start, motion)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             body = self._blocked_body(state)
             where = (
@@ -203,8 +203,8 @@ class Router:
     def _begun(self, start: Pose, motion: tuple[float, ...]) -> Problem:
         return replace(self._whole, start=start, start_motion=motion)
 
-    def _state(self, start: Pose, motion: tuple[float, ...]) -> Floats:
-        """The state ``[S]`` at the start."""
+    def state(self, start: Pose, motion: tuple[float, ...]) -> Floats:
+        """The state ``[S]`` at the start; arguments as of ``route``."""
         return start_state(self._begun(start, motion), self._vehicle)
 
     def _problems(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...]) -> list[Problem]:

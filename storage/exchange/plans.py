@@ -12,7 +12,7 @@ from planners.world.alignment import scaled, shifted
 from planners.world.arrays import Floats, Point
 from planners.world.checked_problem import FAR_M, FARTHEST_M
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError, ended
 from storage.fields import check_fields, number_of, short, text_of
@@ -41,9 +41,9 @@ class PlanRecord:
     scale: float = 1.0  # real metres in one metre of the plan
     offset: Point = (0.0, 0.0)  # real metres: where the plan's origin lies in the frame of the file
 
-    def plan_in_frame_of(self, problem: Problem) -> Plan | None:
-        """The plan where ``problem`` has its origin, whose scale is that of the plan; None without a plan."""
-        x, y = ((a - b) / problem.scale for a, b in zip(self.offset, problem.offset, strict=True))
+    def plan_from(self, origin: Point) -> Plan | None:
+        """The plan with another ``origin``, in metres of the frame of the file; None without a plan."""
+        x, y = ((a - b) / self.scale for a, b in zip(self.offset, origin, strict=True))
         return self.plan and shifted(self.plan, (x, y))
 
 

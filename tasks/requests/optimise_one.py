@@ -43,7 +43,7 @@ class InitialGuess:
         """Return the guess and the name of its planner. Raises RunError if there is no plan to start from."""
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
-            stored = record.plan_in_frame_of(problem)
+            stored = record.plan_from(problem.offset)
             if stored is None or len(stored.controls) == 0:
                 raise RunError(f"{self.plan} holds no plan to start from: its status is {record.status!r}.")
             return stored, record.planner

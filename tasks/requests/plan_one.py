@@ -10,14 +10,14 @@ from planners.attempt import TIMED_PARTS, Attempt
 from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, in_canonical, to_canonical
-from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle, in_short_steps
-from storage.exchange.plans import read_plan
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.vehicle import in_short_steps
 from storage.exchange.problems import read_problem
 from storage.places.data_folder import open_data_folder
 from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
+from tasks.requests.current_plan import current_plan, tell_if_far
 from tasks.requests.plan_answers import (
     gears_told,
     meaning_of,
@@ -27,7 +27,6 @@ from tasks.requests.plan_answers import (
 )
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_plan_outputs
-from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import UNASSISTED
 
 
@@ -76,19 +75,24 @@ def plan_one(
     """
     read = [file, *assistant.files, *([] if current is None else [current])]
     check_plan_outputs(read, out, drawing)
-    near = assistant.vehicle if current is None else in_short_steps(assistant.vehicle)
-    problem = read_problem(file, near, pick)  # who drives may be near what it passes
-    current_plan = None if current is None else _current_plan(current, problem, assistant.vehicle)
+    seen_by = assistant.vehicle if current is None else in_short_steps(assistant.vehicle)
+    problem = read_problem(file, seen_by, pick)  # who drives may be near what it passes
+    driven, near = None, None  # the plan that is being driven, and whether the robot is near it
+    if current is not None:
+        driven = current_plan(current, assistant.vehicle, problem.scale, problem.offset)
+        state = start_state(problem, assistant.vehicle)
+        near = tell_if_far(current, driven, state, assistant.vehicle, problem.scale)
     if learn is not None:
         open_data_folder(learn)
     with no_garbage_collection():
         assistant.warm_up(problem)
         with told_meanwhile("planning"):
-            attempt, plan = assistant(problem, current_plan)
+            attempt, plan = assistant(problem, driven)
     record = assistant.record(problem, attempt, plan)
     written = write_answer_file(out, record)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
-    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
+    answer = plan_answer(record, None if plan is None else out, attempt.verified)
+    answer |= parts | {"near_current": near}
     learned = 0
     if learn is not None:
         learned = remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
@@ -99,16 +103,16 @@ def plan_one(
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
         from dashboards.figures.style import save_picture
 
-        driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
+        far = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
         gears = "" if plan is None else gears_told(answer)
-        caption = f"{driven}{attempt.source or attempt.status}{gears}"
+        caption = f"{far}{attempt.source or attempt.status}{gears}"
         moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
         figure = picture(
             *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
         )
         save_picture(figure, drawing)
     if explained:
-        _explain(assistant, problem, current_plan, attempt, recalled, drive)
+        _explain(assistant, problem, driven, attempt, recalled, drive)
     failure = None
     if plan is None:
         why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
@@ -116,21 +120,10 @@ def plan_one(
     return PlannedOne(attempt, plan, answer, failure, written, learned)
 
 
-def _current_plan(file: Path, problem: Problem, vehicle: Vehicle) -> Plan:
-    """The plan in a file, in the frame and lengths of a problem. Errors are those of ``plan_one``."""
-    record = read_plan(file, vehicle)
-    plan = record.plan_in_frame_of(problem)
-    if plan is None:
-        raise UsageError(f"{file} holds no plan that a robot could drive: its status is {record.status!r}.")
-    if record.scale != problem.scale:
-        raise UsageError(f"{file} has the scale {record.scale:g}, the problem {problem.scale:g}.")
-    return plan
-
-
 def _explain(
     assistant: Assistant,
     problem: Problem,
-    current_plan: Plan | None,
+    driven: Plan | None,
     attempt: Attempt,
     recalled: Sequence[Plan],
     drive: MovedDrive | None,
@@ -147,6 +140,6 @@ def _explain(
     log_explanation(attempt, memory, listed, problem, parts, drive and drive.answer)
     if memory is not None:
         with no_garbage_collection():
-            current = current_plan and in_canonical(current_plan, alignment)
+            current = driven and in_canonical(driven, alignment)
             alone = assistant.improved_attempt(canonical, UNASSISTED.name, current)
             log_without_memory(attempt, alone)

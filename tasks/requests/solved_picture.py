@@ -48,7 +48,7 @@ def _solved(parts: Sequence[FilePart], vehicle: Vehicle) -> Iterator[tuple[Probl
 def _example(problem: Problem, record: PlanRecord, vehicle: Vehicle) -> Example:
     from dashboards.figures.pictures import Example
 
-    plan = record.plan_in_frame_of(problem)
+    plan = record.plan_from(problem.offset)
     caption = problem.id if len(problem.id) <= LONGEST_ID else f"{problem.id[: LONGEST_ID - 1]}…"
     if record.plan is not None and plan is not None:
         gears = gears_told(plan_answer(record, None, None))

@@ -184,7 +184,7 @@ def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> li
         return [problem]
     if record.scale != problem.scale:
         return [f"Scale: it is {record.scale:g}, that of the problem {problem.scale:g}."]
-    return faults(problem, record.plan_in_frame_of(problem) or plan, record.vehicle)
+    return faults(problem, record.plan_from(problem.offset) or plan, record.vehicle)
 
 
 def _refuse(wrong: Sequence[str], where: str) -> None:

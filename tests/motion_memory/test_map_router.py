@@ -83,10 +83,11 @@ def test_who_asks_again_while_driving_never_arrives_later(
         answer = router.route(pose, left, start_motion=motion, current=plan)
         assert answer.plan.duration_s <= plan.duration_s - at * plan.dt + 1e-9
         hurried = router.route(pose, left, start_motion=motion, current=plan, time_limit=1e-9)
+        assert (answer.near_current, hurried.near_current) == (True, True)
         assert hurried.source == "kept" or at == len(plan.controls)  # where nothing is left to drive
         np.testing.assert_allclose(hurried.plan.states, plan.states[at:], atol=1e-6)
     elsewhere = router.route(world.pose(60.0, 6.0, 0.0), goals[1:], current=plan)
-    assert elsewhere.source == "searched"
+    assert (elsewhere.source, elsewhere.near_current, first.near_current) == ("searched", False, None)
     with pytest.raises(ValueError, match="current"):
         router.route(world.pose(*POSE), goals, current=replace(plan, states=plan.states[:, :4]))
 

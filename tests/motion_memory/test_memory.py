@@ -207,6 +207,9 @@ def test_the_current_plan_is_numbers_of_any_kind_and_nothing_else(planner: Memor
         answer = planner.plan(moved, current=given)
         assert answer.plan is not None
         assert answer.plan.duration_s <= plan.duration_s - half * plan.dt + 1e-9
+        assert answer.near_current is True
+    turned = replace(moved, start=(x, y, heading + math.pi))
+    assert planner.plan(turned, current=plan).near_current is False
     for wrong in (
         planner.plan(asked),
         replace(plan, states=plan.states * math.nan),

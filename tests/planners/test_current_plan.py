@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.current_plan import fits, rest_of
+from planners.current_plan import fits, is_near, rest_of
 from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
-from planners.world.problem import Arrival, Plan, Problem, obstacles_of
+from planners.world.problem import Arrival, Plan, Problem, obstacles_of, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle, name_of
 from planners.world.workspace import Workspace
 from tests.worlds import box
@@ -147,6 +147,15 @@ def test_who_is_elsewhere_has_no_plan_left() -> None:
     plan = first_plan("pose", CAR)
     elsewhere = seen_from(np.array([28.0, 0.0, 0.0, 0.0, 0.0]), POSE)
     assert rest_of(plan, elsewhere, CAR, scene_of(elsewhere), WORKSPACE, math.inf) is None
+    assert not is_near(plan, start_state(elsewhere, CAR), CAR)
+
+
+@pytest.mark.parametrize(("off", "near"), [([0.2, 0.1, 0.1], True), ([0.0, 0.0, 1.5], False)])
+def test_near_a_plan_is_who_stands_and_looks_nearly_as_it_says(off: list[float], near: bool) -> None:
+    plan = first_plan("place", CAR)
+    state = plan.states[len(plan.states) // 2].copy()
+    state[:3] += off
+    assert is_near(plan, state, CAR) is near
 
 
 def test_a_goal_may_move_meanwhile() -> None:

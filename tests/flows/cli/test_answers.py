@@ -132,8 +132,20 @@ def test_who_drives_a_plan_is_given_what_is_left_of_it_unless_another_is_quicker
     (place / "moved.json").write_text(json.dumps(moved))
     again = _told("plan moved.json --current driven.json", place, monkeypatch, capsys)["answer"]
     assert again["duration_s"] <= first["duration_s"] - 20 * first["dt"] + 1e-9
+    assert (first["near_current"], again["near_current"]) == (None, True)
     worse = "plan moved.json --planner gust --unpolished"  # which finds nothing as quick
     assert _told(f"{worse} --current driven.json", place, monkeypatch, capsys)["answer"]["source"] == "kept"
+
+
+def test_who_is_elsewhere_is_told_that_the_current_plan_is_left_aside(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _told("plan one.json --out driven.json", place, monkeypatch, capsys)
+    turned = {"start": [0.0, 0.0, -2.4], "goal": [-20.0, -20.0], "bounds": [-40, -40, 9, 9], "obstacles": []}
+    (place / "turned.json").write_text(json.dumps(turned))
+    told = _told("plan turned.json --current driven.json", place, monkeypatch, capsys)
+    assert told["answer"]["near_current"] is False
+    assert ["driven.json" in warning for warning in told["warnings"]] == [True]
 
 
 @pytest.mark.parametrize(
