@@ -29,7 +29,7 @@ from dashboards.figures.map_view import (
 from dashboards.figures.marks import draw_travel_arrows
 from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below
-from dashboards.palette import BLUE, INK, ORANGE, VERMILLION
+from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
 from dashboards.world_outlines import whole_length_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.legs import Leg
@@ -41,7 +41,7 @@ from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
-COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
+COLOURS: Final = {"kept": GREEN, "recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
 _CUSP_LENGTHS: Final = 5.0  # of the vehicle: a last change of gear so near a goal is shown close up
 _APART: Final = 0.1  # of the longer side of what is shown: arrows along the drive
 _CLOSE_UP_ENTRIES: Final = [

@@ -180,6 +180,7 @@ def route(
     format: str | None = None,
     assist: AssistName | None = None,
     time_limit: float | None = None,
+    current: Path | None = None,
     out: Path | None = None,
     picture: Path | None = None,
     learn: Path | None = None,
@@ -208,6 +209,8 @@ def route(
             without.
         time_limit: Seconds of planning, after which the search ends without a route. What is found by then
             depends on the machine.
+        current: The plan that the robot drives now, .json. What is left of it from the start through all
+            goals is the answer unless another drive is quicker.
         out: Where to write the plan, .json.
         picture: Where to draw the route, .png, .svg or .pdf.
         learn: Data folder that remembers the local plans of the route that no memory had.
@@ -228,7 +231,7 @@ def route(
         "start_hitch": start_hitch,
     }
     request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius, time_limit)
-    driven = drive_route(path, format, request, assistant, settings, out, picture, learn)
+    driven = drive_route(path, format, request, assistant, settings, out, picture, learn, current)
     write_for_people(options.vehicle_line(assistant.settings))
     if driven.legs is not None:
         write(driven.legs)

@@ -24,12 +24,14 @@ from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
+from tasks.requests.current_plan import current_plan, tell_if_far
 from tasks.requests.map_routes import (
     LocalSolver,
     canonical_map,
     check_can_stop,
     check_route,
     in_frame_of,
+    in_grid_of,
 )
 from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
@@ -60,6 +62,7 @@ def drive_route(
     out: Path | None,
     drawing: Path | None,
     learn: Path | None = None,
+    current: Path | None = None,
 ) -> DrivenRoute:
     """Plan a route across a map, check it as one plan, and write plan and picture.
 
@@ -72,11 +75,13 @@ def drive_route(
         out: where to write the plan, or None.
         drawing: where to draw it, or None.
         learn: the data folder to which the local plans of the drive are added that no memory had, or None.
+        current: the file of the plan that the robot drives now, in the map's frame; None: it drives none.
 
     Raises:
-        UsageError: an option is malformed, start or goal cannot be used, or an output would be written over
-            an input.
-        StorageError: ``learn`` is no data folder.
+        UsageError: an option is malformed, start or goal cannot be used, an output would be written over an
+            input, or ``current`` holds no plan, or one of another scale.
+        StorageError: ``learn`` is no data folder, or the plan of ``current`` is malformed or for another
+            vehicle.
         PlanFaultError: the independent judge refuses the route.
     """
     check_plan_file(out)
@@ -85,7 +90,9 @@ def drive_route(
     pose = start_of(request)
     check_can_stop(assistant.vehicle)
     source = map_source(path, map_format, "a route")
-    check_outputs([*source.contents(), *assistant.files], [out, drawing])
+    check_outputs(
+        [*source.contents(), *assistant.files, *([] if current is None else [current])], [out, drawing]
+    )
     world = told_map(source, settings)
     scale = settings.scale
     stops = stops_of(request, world, assistant.vehicle, scale)
@@ -104,13 +111,17 @@ def drive_route(
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
     asked = (x / scale, y / scale, heading), stops, motion
+    driven, near = None, None  # the plan that is being driven, and whether the robot is near it
+    if current is not None:
+        driven = in_grid_of(world, current_plan(current, assistant.vehicle, scale, (0.0, 0.0)), scale)
+        near = tell_if_far(current, driven, router.state(asked[0], motion), assistant.vehicle, scale)
     with told_meanwhile("planning"):
         if router.refusal(*asked) is None:
             _drive_mirrored(router_over, canonical, *asked)
             OtherWork()()
         solver.seconds.clear()
         began = working_clock()
-        route = router.route(*asked, request.time_limit)
+        route = router.route(*asked, request.time_limit, driven)
         seconds = working_clock() - began
     if isinstance(route, Stuck):
         if drawing is not None:
@@ -120,7 +131,8 @@ def drive_route(
             stuck = stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle, motion)
             save_picture(stuck, drawing)
         failure = _refusal(route, source, world, scale, any(motion))
-        return DrivenRoute(None, [], {"status": "stuck"} | route.fields(world, scale), failure)
+        stuck_at = {"status": "stuck"} | route.fields(world, scale) | {"near_current": near}
+        return DrivenRoute(None, [], stuck_at, failure)
     plan = route.plan(assistant.vehicle)
     check_route(route, plan, assistant.vehicle, assistant.settings.seed)
     record = _record(route, plan, world, assistant, seconds, scale)
@@ -140,6 +152,7 @@ def drive_route(
         "legs_from_memory": legs_from_memory(route),
         "local_plans": len(solver.seconds),
         "seconds": seconds,
+        "near_current": near,
     }
     answer = plan_answer(record, out, True) | more
     return DrivenRoute(route_table(route, assistant, scale), summary, answer, learned=learned)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from dashboards.cells import CellTable, decimal
-from planners.attempt import FROM_MEMORY, WITHOUT_MEMORY
+from planners.attempt import FROM_MEMORY, KEPT, WITHOUT_MEMORY
 from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
@@ -167,13 +167,12 @@ def legs_from_memory(route: Route) -> int:
 
 def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
     """A line with the mean speed, and that of a drive as long at full speed with a rest at each goal."""
-    shortest = sum(map(length_of, route.paths))
     mean = plan.length_m / max(plan.duration_s, 1e-9)
     share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)
-    return (
-        f"{scale * mean:.2f} m/s on average, {share:.0%} of what full speed "
-        f"from goal to goal would be; the shortest way over the cells has {scale * shortest:.0f} m"
-    )
+    pace = f"{scale * mean:.2f} m/s on average, {share:.0%} of what full speed from goal to goal would be"
+    if route.source == KEPT:  # its paths are the drive itself
+        return pace
+    return f"{pace}; the shortest way over the cells has {scale * sum(map(length_of, route.paths)):.0f} m"
 
 
 def _count(number: int, noun: str) -> str:

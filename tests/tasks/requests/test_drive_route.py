@@ -236,6 +236,36 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         assert np.hypot(*(record.plan.states[:, :2] - goal).T).min() <= 2.0
 
 
+def test_who_drives_a_route_is_given_what_is_left_of_it_unless_another_is_quicker(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive, again = tmp_path / "drive.json", tmp_path / "again.json"
+    (x, y), (right, up) = placed(8.0, 6.0), placed(60.0, 80.0)
+    asked = ["route", str(town / "town.yaml"), "--to", f"{right},{up}"]
+    scaled, begin = ["--scale", str(SCALE)], f"{x},{y},1.0"
+    assert call([*asked, *scaled, "--from", begin, "--out", str(drive)]) == 0
+    first = read_plan(drive).plan
+    assert first is not None
+    x, y, heading, speed, steering = json.loads(drive.read_text())["states"][20]
+    moved = ["--from", f"{x},{y},{heading}", "--start-speed", str(speed), "--start-steering", str(steering)]
+    moved += ["--time-limit", "1e-9"]  # in which nothing is found
+    current = ["--current", str(drive), "--out", str(again), "--picture", str(tmp_path / "kept.png")]
+    assert call([*asked, *scaled, *moved, *current]) == 0
+    left = read_plan(again)
+    assert left.source == "kept"
+    assert left.plan is not None
+    np.testing.assert_allclose(left.plan.states, first.states[20:], atol=1e-6)
+
+    capsys.readouterr()
+    far = placed(60.0, 6.0)
+    assert call([*asked, *scaled, "--from", f"{far[0]},{far[1]},1.0", "--current", str(drive), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["answer"]["near_current"] is False
+    assert [str(drive) in warning for warning in told["warnings"]] == [True]
+    assert call([*asked, "--from", begin, "--current", str(drive)]) == 2
+    assert "scale" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "code", "told"),
     [
