@@ -72,7 +72,7 @@ def drive_route(
         request: from where to where.
         assistant: solves the local problems.
         settings: how to read the map, and the metres of the map in a canonical metre.
-        out: where to write the plan, or None.
+        out: where to write the plan, or None; it may be the file of ``current``.
         drawing: where to draw it, or None.
         learn: the data folder to which the local plans of the drive are added that no memory had, or None.
         current: the file of the plan that the robot drives now, in the map's frame; None: it drives none.
@@ -90,9 +90,7 @@ def drive_route(
     pose = start_of(request)
     check_can_stop(assistant.vehicle)
     source = map_source(path, map_format, "a route")
-    check_outputs(
-        [*source.contents(), *assistant.files, *([] if current is None else [current])], [out, drawing]
-    )
+    check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = told_map(source, settings)
     scale = settings.scale
     stops = stops_of(request, world, assistant.vehicle, scale)

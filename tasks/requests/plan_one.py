@@ -56,7 +56,8 @@ def plan_one(
     Args:
         assistant: solves the problem.
         file: the file of the problem.
-        out: where to write the plan, or None. Why there is none is written too, but over no older file.
+        out: where to write the plan, or None; it may be the file of ``current``. Why there is none is written
+            too, but over no older file.
         drawing: where to draw it, or None.
         explained: whether to log and draw the recalled plans, where they collide and how they were used.
         learn: the data folder to which the problem and its plan are added as an experience, or None.
@@ -73,8 +74,7 @@ def plan_one(
         StorageError: the problem or the plan of ``current`` is malformed or for another vehicle, the file has
             no such problem, or ``learn`` is no data folder.
     """
-    read = [file, *assistant.files, *([] if current is None else [current])]
-    check_plan_outputs(read, out, drawing)
+    check_plan_outputs([file, *assistant.files], out, drawing)
     seen_by = assistant.vehicle if current is None else in_short_steps(assistant.vehicle)
     problem = read_problem(file, seen_by, pick)  # who drives may be near what it passes
     driven, near = None, None  # the plan that is being driven, and whether the robot is near it

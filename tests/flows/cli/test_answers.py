@@ -169,8 +169,30 @@ def test_a_current_plan_that_cannot_be_driven_on_is_refused(
     (place / "other.json").write_text(json.dumps(driven | changes))
     told = _told("plan one.json --current other.json", place, monkeypatch, capsys, code)
     assert why in told["error"]
-    told = _told("plan one.json --current driven.json --out driven.json", place, monkeypatch, capsys, 2)
-    assert "driven.json" in told["error"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "blocked"),
+    [
+        ("plan one.json", "plan walled.json"),
+        ("route town.npy --from 20,20,0 --to 120,120", "route town.npy --from 20,20,0 --to 900,120"),
+    ],
+)
+def test_a_plan_takes_the_place_of_the_one_that_is_driven_and_nothing_else_does(
+    asked: str, blocked: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def states() -> Any:
+        return json.loads((place / "driven.json").read_text())["states"]
+
+    monkeypatch.chdir(place)
+    assert call([*asked.split(), "--unpolished", "--out", "driven.json"]) == 0
+    first = states()
+    again = ["--current", "driven.json", "--out", "driven.json"]
+    assert call([*asked.split(), *again]) == 0
+    second = states()
+    assert 0 < len(second) < len(first)
+    assert call([*blocked.split(), *again]) in (1, 2)
+    assert states() == second
 
 
 def test_the_parts_of_a_plan_are_numbers_and_its_states_are_there_once(
