@@ -48,7 +48,12 @@ def package_version() -> str:
 
 
 def _converted(type_: Any, tokens: Any) -> Any:
-    """The value of an option; without this, cyclopts rounds a fraction where a whole number is wanted."""
+    """The value of an option; without this, cyclopts rounds a fraction where a whole number is wanted.
+
+    It also refuses an empty text, as of a variable that is not set: as a path it would be the folder here.
+    """
+    if any(not token.value for token in tokens):
+        raise ValueError("an empty text is no value; give one, or leave it out")
     if _holds_whole_numbers(type_):
         for token in tokens:
             if "." in token.value:
@@ -85,7 +90,7 @@ Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
 
 @app.meta.default
 def with_output(
-    *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True, converter=convert)],
     json: Flag = False,
     quiet: Flag = False,
     verbose: Flag = False,

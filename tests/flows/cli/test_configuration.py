@@ -24,6 +24,7 @@ def _called(folder: Path, text: str, arguments: list[str], monkeypatch: pytest.M
         ("[verify]\nsample = 2.0", "--sample is 2.0"),
         ("[verify]\nsampel = 0.5", "--sample"),
         ("[verify]\nsample = 'x'", "sample"),
+        ("[verify]\nmap = ''", "empty"),
         ("[veryfi]\nsample = 0.5", "[verify]"),
         ("sample = 0.5", "'sample', which is not a command"),
         ("verify = 0.5", "[verify]"),
