@@ -6,23 +6,28 @@ Commands check the same bounds themselves, with words of their own.
 from __future__ import annotations
 
 import inspect
+import sys
 from copy import copy
 from functools import reduce
 from operator import or_
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_origin
 
-from annotated_types import Ge, Gt, Interval
+from annotated_types import Ge, Interval
 
 if TYPE_CHECKING:
     from prefect import Flow
 
+_LARGEST: Final = sys.float_info.max  # infinity is none of these
 _USUAL: Final = {int: Ge(1)}  # most whole numbers count something
 _OF_NAME: Final = {
     "seed": Ge(0),
     "poses": Interval(ge=0.0, le=1.0),
-    **dict.fromkeys(("learning_rate", "margin", "time_limit", "scale", "resolution", "goal_radius"), Gt(0.0)),
-    **dict.fromkeys(("origin_weight", "tolerance", "improve_seconds"), Ge(0.0)),
+    **dict.fromkeys(
+        ("learning_rate", "margin", "time_limit", "scale", "resolution", "goal_radius"),
+        Interval(gt=0.0, le=_LARGEST),
+    ),
+    **dict.fromkeys(("origin_weight", "tolerance", "improve_seconds"), Interval(ge=0.0, le=_LARGEST)),
 }
 
 

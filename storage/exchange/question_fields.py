@@ -79,16 +79,19 @@ def goal_of(fields: Mapping[str, Any]) -> Goal:
     x, y, *heading = numbers_of(fields, "goal", len(goal))
     if heading:
         _refuse(fields, "goal_radius", "a pose has goal_tolerance, [metres, radians]")
-        radius, tolerance = numbers_of(fields, "goal_tolerance", 2, USUAL_POSE)
-        pose: dict[str, Any] = {"heading": heading[0], "heading_tolerance": tolerance}
+        radius, turn = numbers_of(fields, "goal_tolerance", 2, USUAL_POSE)
+        pose: dict[str, Any] = {"heading": heading[0], "heading_tolerance": turn}
         speeds = numbers_of(fields, "goal_speed", 2, [0.0, 0.0])
     else:
         _refuse(fields, "goal_tolerance", "a place has goal_radius; a pose is a goal with 3 numbers")
         given = fields.get("goal_radius")
         radius = GOAL_RADIUS if given is None else number_of(given, "goal_radius")
-        pose = {}
+        pose, turn = {}, 0.0
         speeds = numbers_of(fields, "goal_speed", 2, [-math.inf, math.inf])
     hitches, tolerances = (tuple(_any_numbers(fields, name)) for name in ENDS[2:])
+    for name, angle in (("goal_tolerance", turn), *(("goal_hitch_tolerance", each) for each in tolerances)):
+        if not math.isfinite(angle):
+            raise ValueError(f"{name} is {angle:g} rad; expected a finite angle above 0")
     arrival = Arrival(
         **pose, least_speed=speeds[0], most_speed=speeds[1], hitches=hitches, hitch_tolerances=tolerances
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -213,7 +214,17 @@ def test_prefect_knows_the_bounds_of_every_number(deployed: list[dict[str, Any]]
         assert _unbounded(flow) <= FREE, flow.name
 
 
-@pytest.mark.parametrize("given", [{"poses": 1.1}, {"poses": -0.1}, {"scale": 0.0}, {"tolerance": -1.0}])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"poses": 1.1},
+        {"poses": -0.1},
+        {"scale": 0.0},
+        {"scale": math.inf},
+        {"tolerance": -1.0},
+        {"tolerance": math.inf},
+    ],
+)
 def test_numbers_out_of_bounds_are_refused_before_a_run_begins(given: dict[str, Any]) -> None:
     (name,) = given
     with pytest.raises(ParameterTypeError, match=name):

@@ -167,6 +167,11 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal_speed": [2, 1]}, "goal_speed [2, 1] is inverted"),
         ({"goal_speed": [5, 6]}, "beyond the vehicle"),
         ({"goal_hitch": [0.1]}, "has no trailer; name the vehicle"),
+        *[
+            ({"goal": [50, 50, 1], "goal_radius": None, "goal_tolerance": [0.1, angle]}, "goal_tolerance")
+            for angle in (math.inf, -math.inf, math.nan, 10**400)
+        ],
+        ({"goal_hitch": [0.1], "goal_hitch_tolerance": [math.inf]}, "goal_hitch_tolerance"),
         (
             {"moving": [{"polygon": [[1, 1], [2, 1], [2, 2]], "velocity": [1, 0]}]},
             "what moves is not supported",
