@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from flows.cli.choices import Difficulty
 from flows.cli.run_options import Flag, worker_count
 from flows.cli.solve_options import MapOptions
-from flows.cli.terminal import SHORT, write, write_answer, write_files
+from flows.cli.terminal import SHORT, write, write_answer, write_files, write_for_people
 
 if TYPE_CHECKING:
     from prefect import Flow
@@ -31,6 +31,7 @@ class LibraryOptions:
         poses: Share of the drawn questions that ask for a pose, not for a place.
         difficulty: Difficulty of classes and families.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+            Default: that of the first file of problems, else car.
         seed: Everything random follows from it.
         test_problems: Held-back questions that libraries are judged by.
         approve: A library that is better waits for `motion-memory promote`.
@@ -41,7 +42,7 @@ class LibraryOptions:
     plans: int = 1000
     poses: float = 0.25
     difficulty: Difficulty = "standard"
-    vehicle: str = "car"
+    vehicle: str | None = None
     seed: int = 1
     test_problems: int = 200
     approve: Flag = False
@@ -75,16 +76,20 @@ def retrain_library(
         reading: How maps are read.
     """
     from tasks.libraries.pending_library import check_there_is_something, library_dry_run
+    from tasks.registry.settled_vehicle import vehicle_line
+    from tasks.requests.question_sources import first_of_problems
     from tasks.servers.prefect_server import local_server
     from tasks.session.folder_lock import locked_folder
     from tasks.settings.environment import default_data
 
-    data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
+    data = options.data or default_data()
+    asked, driver = _asked(name, sources or [], options, reading)
+    write_for_people(vehicle_line(driver, options.vehicle, first_of_problems(asked.sources)))
     if dry_run:
         write(library_dry_run(data, asked))
         return 0
     check_there_is_something(data, asked)
-    given = _parameters(asked, options, reading)
+    given = _parameters(asked, driver, options, reading)
     with locked_folder(data) as folder, local_server(folder.path) as server:
         from flows.retrain_library import retrain_library as flow  # late: Prefect reads its environment
 
@@ -125,11 +130,15 @@ def serve_library(
     from tasks.champions.drift_watch import RESOURCE, RESOURCE_OF
     from tasks.champions.retraining_schedule import serve
     from tasks.libraries.pending_library import check_there_is_something
+    from tasks.registry.settled_vehicle import vehicle_line
+    from tasks.requests.question_sources import first_of_problems
     from tasks.settings.environment import default_data
 
-    data, asked = options.data or default_data(), _asked(name, sources or [], options, reading)
+    data = options.data or default_data()
+    asked, driver = _asked(name, sources or [], options, reading)
     check_there_is_something(data, asked)
-    given = _parameters(asked, options, reading)
+    write_for_people(vehicle_line(driver, options.vehicle, first_of_problems(asked.sources)))
+    given = _parameters(asked, driver, options, reading)
     drifting = {RESOURCE: f"{RESOURCE_OF}{asked.registered}/*"}
     serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, drifting)
 
@@ -142,22 +151,30 @@ def retrain_library_flow() -> Flow[..., Any]:
     return bounded_flow(retrain_library)
 
 
-def _parameters(asked: LibraryRetraining, options: LibraryOptions, reading: MapOptions) -> dict[str, Any]:
+def _parameters(
+    asked: LibraryRetraining, driver: str, options: LibraryOptions, reading: MapOptions
+) -> dict[str, Any]:
     """The parameters of the flow, but for the data folder; paths are absolute."""
     given = asdict(options) | asdict(reading) | {"name": asked.name, "sources": list(asked.sources)}
     del given["data"]
-    vehicle = Path(options.vehicle)
-    given["vehicle"] = str(vehicle.absolute()) if vehicle.suffix else options.vehicle
+    file = Path(options.vehicle or "")
+    given["vehicle"] = str(file.absolute()) if file.suffix else driver
     return given | {"workers": worker_count(options.workers)}
 
 
-def _asked(name: str, sources: list[str], options: LibraryOptions, reading: MapOptions) -> LibraryRetraining:
-    """What is asked for; raises UsageError before anything starts."""
+def _asked(
+    name: str, sources: list[str], options: LibraryOptions, reading: MapOptions
+) -> tuple[LibraryRetraining, str]:
+    """What is asked for, and the vehicle that drives; raises UsageError before anything starts."""
     from tasks.libraries.pending_library import library_retraining
+    from tasks.registry.settled_vehicle import settled_vehicle
     from tasks.requests.import_worlds import import_settings
+    from tasks.requests.question_sources import first_of_problems
 
-    settings = import_settings(options.vehicle, options.seed, **asdict(reading))
-    return library_retraining(
+    driver = settled_vehicle(options.vehicle, first_of_problems(sources))
+    settings = import_settings(driver, options.seed, **asdict(reading))
+    asked = library_retraining(
         *(name, sources, options.plans, options.poses, options.difficulty, settings),
         *(options.test_problems, options.approve),
     )
+    return asked, driver

@@ -95,17 +95,19 @@ def gather(
         workers: Worker processes; default one for each core.
         reading: How maps are read.
     """
-    from tasks.registry.settled_vehicle import settled_vehicle
+    from tasks.registry.settled_vehicle import settled_vehicle, vehicle_line
     from tasks.requests import gather as task
     from tasks.requests.import_worlds import import_settings
     from tasks.requests.question_sources import first_of_problems
 
-    driver = settled_vehicle(vehicle, first_of_problems(sources))
+    problems = first_of_problems(sources)
+    driver = settled_vehicle(vehicle, problems)
     settings = import_settings(driver, seed, **asdict(reading))
     counts = task.gather(
         sources, out, plans, poses, difficulty, settings, worker_count(workers), gather_pieces
     )
     wanted = task.wanted_plans(plans, sources, counts)
+    write_for_people(vehicle_line(driver, vehicle, problems))
     write(task.gathered_table(counts))
     write_files(library=out)
     if model is not None:

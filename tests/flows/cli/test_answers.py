@@ -292,7 +292,7 @@ def test_the_tables_of_runs_are_documented(
 @pytest.mark.parametrize(
     "words",
     ["plan one.json", "solve few.jsonl --out rows.parquet", "optimise empty.parquet --straight",
-     "route town.npy --from 20,20,0 --to 120,120"],
+     "route town.npy --from 20,20,0 --to 120,120", "retrain-library lots lot --data new --dry-run"],
 )  # fmt: skip
 def test_people_are_told_the_vehicle_and_where_it_is_the_default(
     words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -306,7 +306,8 @@ def test_people_are_told_the_vehicle_and_where_it_is_the_default(
 
     monkeypatch.setattr(optimise_one, "optimise_one", once)
     assumed = "vehicle  car, the default; --vehicle names another"
-    with_memory = [] if words.startswith("optimise") else [(["--memory", "memory"], "vehicle  car")]
+    takes_memory = words.split()[0] in ("plan", "solve", "route")
+    with_memory = [(["--memory", "memory"], "vehicle  car")] if takes_memory else []
     for more, line in [([], assumed), (["--vehicle", "car"], "vehicle  car"), *with_memory]:
         assert call([*words.split(), *more]) == 0
         assert line in capsys.readouterr().out.splitlines()
@@ -320,5 +321,10 @@ def test_the_vehicle_that_a_problem_states_is_no_default(
 ) -> None:
     monkeypatch.chdir(place)
     (place / "stated.json").write_text(json.dumps(fields_of(problem(0)) | {"vehicle": "car"}))
-    assert call(["plan", "stated.json"]) == 0
-    assert "vehicle  car" in capsys.readouterr().out.splitlines()
+    for command in (
+        ["plan", "stated.json"],
+        ["gather", "stated.json", "--out", "of-stated", "--workers", "1"],
+        ["retrain-library", "lots", "stated.json", "--data", "new", "--dry-run"],
+    ):
+        assert call(command) == 0
+        assert "vehicle  car" in capsys.readouterr().out.splitlines()
