@@ -113,8 +113,8 @@ class Drift:
             )
         benchmark = "its benchmark, of plans as found" if self.then_as_found else "its benchmark"
         return (
-            f"{self.memory}, {self.configuration}: {100 * self.now.hit_rate:.1f} % hits, "
-            f"{100 * self.then.hit_rate:.1f} in {benchmark} ({verdict}, p = {self.p_value:.2g}); "
+            f"{self.memory}, {self.configuration}: the memory fits {100 * self.now.hit_rate:.1f} % of the "
+            f"problems, {100 * self.then.hit_rate:.1f} in {benchmark} ({verdict}, p = {self.p_value:.2g}); "
             f"mean {self.now.mean_ms:.2f} ms, {self.then.mean_ms:.2f} then{total}"
         )
 

@@ -206,10 +206,10 @@ def _write_summary(solved: SolvedMany) -> None:
     hits, fit = solved.tally.hits, []
     if hits is not None:
         answers = outcomes["recalled"] + outcomes["repaired"]
-        fit = [
-            f"memory   {answers:,} of {count:,} answers are from memory ({answers / count:.2%}); "
-            f"recalled plans fit {hits:,} problems as they are"
-        ]
+        fit = [f"memory   {answers:,} of {count:,} answers are from memory ({answers / count:.2%})"]
+        outdone = hits - outcomes["recalled"]
+        if outdone > 0:
+            fit[0] += f"; for {outdone:,} others it had a plan that fits, but a quicker one was found"
     driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
