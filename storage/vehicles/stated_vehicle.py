@@ -42,7 +42,8 @@ def stated_vehicle(fields: Any) -> Vehicle | None:
     if vehicle is None:
         raise ValueError(
             f"vehicle is {short(said)}, expected one of {', '.join(VEHICLES)} or a whole definition, as "
-            "`draw --vehicle FILE` writes it; or leave it out"
+            "`draw --vehicle FILE` writes it; or leave it out, and name the file of the vehicle (--vehicle, "
+            "in Python vehicle=)"
         )
     return vehicle
 
