@@ -188,7 +188,7 @@ def route(
     learn: Path | None = None,
     options: SolveOptions = _USUAL,
     reading: MapOptions = _AS_IT_IS,
-) -> None:
+) -> int:
     """Plan a drive over a map, made of local plans, from memory where possible.
 
     Args:
@@ -242,3 +242,4 @@ def route(
     write_learned(learn, driven.learned)
     if driven.failure is not None:
         raise driven.failure
+    return SHORT if driven.learned is None else 0

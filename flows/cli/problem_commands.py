@@ -61,7 +61,7 @@ def plan(
     picture: Path | None = None,
     learn: Path | None = None,
     options: SolveOptions = _USUAL,
-) -> None:
+) -> int:
     """Plan for one problem; write the plan and a picture.
 
     Args:
@@ -102,6 +102,7 @@ def plan(
     write_learned(learn, learned)
     if failure is not None:
         raise RunError(failure)
+    return SHORT if learned is None else 0
 
 
 def optimise(

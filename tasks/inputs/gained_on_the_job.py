@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,7 +17,7 @@ from planners.attempt import NEW, Attempt
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Arrival, Problem, begins_straight, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
-from storage.errors import InUseError, StorageError
+from storage.errors import InUseError, StorageError, ended
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import local_place, remove
 from storage.places.run_folder import checked_name
@@ -26,6 +27,8 @@ from tasks.settings.run_settings import RunSettings
 
 NAMELESS: Final = ("", "problem")  # ids of problems that were given none
 DIGITS: Final = 12  # of a question's digest, in its id
+
+_LOG: Final = logging.getLogger(__name__)
 
 
 class Solved(NamedTuple):
@@ -80,6 +83,20 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
                     vehicle=vehicle,
                 )
     return len(straight) + len(questions)
+
+
+def remember_or_warn(data: Path | None, attempts: Sequence[Solved], vehicle: Vehicle) -> int | None:
+    """Like ``remember``, for who has a plan in hand: warn if nothing can be kept, and return None.
+
+    Without a data folder nothing is kept: 0.
+    """
+    if data is None:
+        return 0
+    try:
+        return remember(data, attempts, vehicle)
+    except (StorageError, OSError) as error:
+        _LOG.warning("The plan is there, but nothing is learned of it: %s", ended(str(error)))
+        return None
 
 
 def question_digest(question: Problem) -> str:

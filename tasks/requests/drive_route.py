@@ -22,7 +22,7 @@ from storage.places.data_folder import open_data_folder
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
 from tasks.attempts.timing import OtherWork
-from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import Solved, remember_or_warn
 from tasks.requests.assistant import Assistant
 from tasks.requests.current_plan import current_plan, tell_if_far
 from tasks.requests.map_routes import (
@@ -50,7 +50,7 @@ class DrivenRoute(NamedTuple):
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
     answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of ...
     failure: UsageError | RunError | None = None  # ... or, if there is none, those of ``Stuck.fields``
-    learned: int = 0  # local plans that no memory had and that are kept
+    learned: int | None = 0  # local plans that no memory had and that are kept; None if that failed
 
 
 def drive_route(
@@ -136,9 +136,8 @@ def drive_route(
     record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
-    learned = 0
-    if learn is not None:
-        learned = remember(learn, [Solved(*each) for each in route.new_attempts(scale)], assistant.vehicle)
+    local = [Solved(*each) for each in route.new_attempts(scale)]
+    learned = remember_or_warn(learn, local, assistant.vehicle)
     summary = route_summary(route, plan, stops, assistant, scale, solver.seconds, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late, as above

@@ -15,7 +15,7 @@ from planners.world.vehicles.vehicle import in_short_steps
 from storage.exchange.problems import read_problem
 from storage.places.data_folder import open_data_folder
 from tasks.attempts.timing import no_garbage_collection
-from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import Solved, remember_or_warn
 from tasks.requests.assistant import Assistant
 from tasks.requests.current_plan import current_plan, tell_if_far
 from tasks.requests.plan_answers import (
@@ -38,7 +38,7 @@ class PlannedOne(NamedTuple):
     answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
     failure: str | None  # why there is no plan, in one line
     written: Path | None  # the file of the plan
-    learned: int  # 1 if the plan is kept as one that no memory had, else 0
+    learned: int | None  # 1 if the plan is kept as one that no memory had, else 0; None if that failed
 
 
 def plan_one(
@@ -93,9 +93,8 @@ def plan_one(
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified)
     answer |= parts | {"near_current": near}
-    learned = 0
-    if learn is not None:
-        learned = remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
+    solved = Solved(to_canonical(problem)[0], attempt)
+    learned = remember_or_warn(learn, [solved], assistant.vehicle)
     recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
     drive = assistant.moved_drive(problem, attempt) if explained else None
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"

@@ -14,6 +14,7 @@ from dashboards.report import retrieval_tables, tables
 from dashboards.verdicts import comparison_tables, promotion
 from flows.cli.main import call
 from storage.exchange.problems import fields_of, write_problems
+from storage.places.data_folder import open_data_folder
 from tasks.champions import dry_run
 from tasks.requests import optimise_one
 from tests.tasks.served import problem, write_memory
@@ -314,6 +315,20 @@ def test_people_are_told_the_vehicle_and_where_it_is_the_default(
     for more in (["--json"], ["--quiet"]):
         assert call([*words.split(), *more]) == 0
         assert "--vehicle names" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", ["plan one.json", "route town.npy --from 20,20,0 --to 120,120"])
+def test_an_answer_is_told_where_it_cannot_be_learned(
+    words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(place)
+    full = open_data_folder(place / f"full-{words.split()[0]}").path
+    (full / "learned").touch()  # where there should be a folder
+    assert call([*words.split(), "--learn", str(full), "--json", "--picture", "learned.png"]) == 3
+    told = json.loads(capsys.readouterr().out)
+    assert told["answer"]["status"] == "solved"
+    assert [str(full) in warning for warning in told["warnings"]] == [True]
+    assert told["files"] == {"picture": "learned.png"}
 
 
 def test_the_vehicle_that_a_problem_states_is_no_default(
