@@ -21,7 +21,7 @@ from dashboards.figures.map_view import (
     view_around,
 )
 from dashboards.figures.style import legend_below
-from dashboards.palette import INK, VERMILLION
+from dashboards.palette import GREEN, INK, VERMILLION
 from dashboards.world_outlines import asked_pose, outlines, whole_length_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
@@ -51,7 +51,7 @@ def stuck_picture(
     """A figure of a map in its own frame and where a route over it ends too early.
 
     Close up it shows what is around that place, if it is on the map. If it is the start or a goal pose, the
-    vehicle stands there.
+    vehicle stands there, and where it would be free, if that is near.
 
     Args:
         world: the map, in metres.
@@ -97,14 +97,17 @@ def stuck_picture(
         if standing is None:
             close_up.plot(x, y, **_CROSS, markersize=11, zorder=12)
         else:
-            bodies, _ = outlines(*standing)
-            shown = [placed(world, scale * body) for body in bodies]
-            close_up.add_collection(
-                PolyCollection(shown, facecolor="none", edgecolor=VERMILLION, linewidth=1.4, zorder=5)
-            )
-            handles.append(
-                Patch(facecolor="none", edgecolor=VERMILLION, label="where the vehicle would stand")
-            )
+            states, driver = standing
+            stands = [(stuck.place, VERMILLION, "where the vehicle would stand")]
+            stands += [] if stuck.free is None else [(stuck.free, GREEN, "where it would be free")]
+            for place, colour, label in stands:
+                there = states.copy()
+                there[:, :2] += np.subtract(place, stuck.place)
+                shown = [placed(world, scale * body) for body in outlines(there, driver)[0]]
+                close_up.add_collection(
+                    PolyCollection(shown, facecolor="none", edgecolor=colour, linewidth=1.4, zorder=5)
+                )
+                handles.append(Patch(facecolor="none", edgecolor=colour, label=label))
     handles += cells_legend(world, OCCUPIED)
     legend_below(figure, handles, 4)
     return figure

@@ -71,6 +71,19 @@ def test_where_a_route_ends_too_early_is_in_the_middle_of_a_close_up() -> None:
         np.testing.assert_allclose(shown.mean(axis=1), place)
 
 
+def test_where_the_vehicle_would_be_free_is_drawn_beside_where_it_would_stand() -> None:
+    world = OccupancyMap("wall", np.zeros((40, 40), bool), 1.0)
+    world.occupied[:, 20] = True
+    start = (19.7, 20.0, 0.5 * math.pi)
+    stuck = Router(world, searched).route(start, [PLACE])
+    assert isinstance(stuck, Stuck)
+    assert stuck.free is not None
+    _, close_up = stuck_picture(world, start, [PLACE], stuck, 1.0).axes
+    stands, free = (each.get_paths()[0].vertices for each in close_up.collections)
+    np.testing.assert_allclose(free - stands, np.tile(np.subtract(stuck.free, stuck.place), (len(free), 1)))
+    assert stands[:, 0].max() > 20.0 > free[:, 0].max()
+
+
 def test_of_a_place_that_is_not_on_the_map_there_is_no_close_up() -> None:
     world, stops = town(), [Stop((2000.0, 12.0))]
     stuck = Router(world, searched).route(START, stops)
