@@ -49,6 +49,11 @@ class ProblemSlice:
 
 def format_of(path: Path) -> str:
     """The ending of ``path``, which gives its format. Raises StorageError for any other ending."""
+    if path.is_dir():
+        raise StorageError(
+            f"{path} is a folder; give a file of problems ({', '.join(FORMATS)}), as import-worlds makes "
+            "of a folder of worlds."
+        )
     if path.suffix not in FORMATS:
         cut = ", or make problems from a map or worlds with import-worlds" if path.exists() else ""
         raise StorageError(

@@ -83,6 +83,7 @@ def test_a_folder_of_somebody_else_is_named_in_one_line(
         (["draw", "lot", "--problems", "0", "--out", "p.jsonl"], 2, "0 problems: give 1 or more."),
         (["draw", "lot", "--out", "p.txt"], 1, "p.txt ends in '.txt'"),
         (["draw", "lot", "--out", "p.json"], 1, "p.json can hold only one problem, got 100"),
+        (["plan", "."], 1, ". is a folder"),
         (["plan", ""], 2, "empty"),
         (["plan", "p.json", "--current", ""], 2, "--current: an empty"),
         (["plan", "p.json", "--vehicle="], 2, "--vehicle: an empty"),

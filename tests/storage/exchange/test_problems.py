@@ -264,7 +264,7 @@ def test_a_file_that_is_missing_cut_off_or_of_another_kind_is_refused(tmp_path: 
         ("picture.json", "not a text file"),
         ("cut.parquet", "not a complete Parquet file"),
         ("other.parquet", "unknown field 'x'"),
-        ("folder.json", "cannot be read"),
+        ("folder.json", "is a folder"),
     ]:
         with pytest.raises(StorageError) as error:
             read_problems(tmp_path / name)
