@@ -69,5 +69,5 @@ def is_free_closely(plan: Plan, vehicle: Vehicle, scene: Scene) -> bool:
 
 def _ramp(change: float, rate: float, dt: float) -> Floats:
     """Equal controls, none above ``rate``, that together make a ``change``."""
-    steps = max(math.ceil(abs(change) / (rate * dt) - 1e-9), int(change != 0.0))
+    steps = max(math.ceil(abs(change) / (rate * dt) - 1e-12), int(change != 0.0))
     return np.full(steps, change / (steps * dt)) if steps else np.zeros(0)

@@ -41,6 +41,7 @@ def within_limits(states: Floats, controls: Floats, vehicle: Vehicle) -> bool:
 @pytest.mark.parametrize("name", VEHICLES)
 @given(speed=st.floats(-1.0, 4.0), aside=st.floats(-0.69, 0.69))
 @example(speed=0.0, aside=1e-12)
+@example(speed=0.0, aside=0.16 * (1.0 + 9e-10))  # one step at full rate, and a little more
 def test_braking_ends_at_rest_all_straight(name: str, speed: float, aside: float) -> None:
     vehicle = VEHICLES[name]
     state = at_rest(*MIDDLE, vehicle)
