@@ -111,6 +111,11 @@ def is_near(current: Plan, state: Floats, vehicle: Vehicle) -> bool:
     return bool(_off(_nearest(current, state, vehicle)[1], vehicle) <= OFF)
 
 
+def steps_left(current: Plan, state: Floats, vehicle: Vehicle) -> int:
+    """How many steps of its plan are ahead of a robot in a ``state [S]``."""
+    return len(current.controls) - _nearest(current, state, vehicle)[0]
+
+
 def fits(current: Plan, vehicle: Vehicle) -> bool:
     """Whether states and steps of a plan are those of a vehicle."""
     states, controls = current.states, current.controls

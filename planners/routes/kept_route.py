@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from planners.current_plan import rest_of
+from planners.current_plan import rest_of, steps_left
 from planners.routes.legs import Leg, joined, polished_legs
 from planners.routes.route import Route
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene
-from planners.world.problem import Plan, Problem, starting_at
+from planners.world.problem import Plan, Problem, start_state, starting_at
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 
@@ -23,8 +23,8 @@ def kept_route(
 ) -> Route | None:
     """Drive what is left of a plan through some stops.
 
-    First comes what leads to all stops at once, so that there is a route in however short a time. Then each
-    drive is polished, and those behind it begin where it ends.
+    First comes what leads to all stops at once, so that there is a route in however short a time. If it takes
+    longer than what was left, each drive is then polished, and those behind it begin where it ends.
 
     Args:
         current: the plan.
@@ -40,7 +40,9 @@ def kept_route(
     if legs is None:
         return None
     vehicle = around[0]
-    for number in range(len(legs) if polishes else 0):
+    left = steps_left(current, start_state(problems[0], vehicle), vehicle)
+    is_later = sum(len(leg.controls) for leg in legs) > left
+    for number in range(len(legs) if polishes and is_later else 0):
         before = legs[number:]
         [better] = polished_legs(before[0].problem, before[:1], *around, until - working_clock())
         if better is before[0]:

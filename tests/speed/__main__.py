@@ -22,6 +22,7 @@ SECTIONS: Final = {
     "driving_costs": "tests.speed.driving_costs",
     "tight_doors": "tests.speed.tight_doors",
     "again_while_driving": "tests.speed.again_while_driving",
+    "beside_routes": "tests.speed.beside_routes",
     "manoeuvres": "tests.speed.manoeuvres",
     "kin": "tests.speed.kin",
     "peers": "tests.speed.peers.comparison",
