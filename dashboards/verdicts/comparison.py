@@ -125,7 +125,7 @@ def compare_runs(
         hold for all rows at once; planning has them only ``in_turn``. ``verdict`` is BETTER, WORSE or SAME,
         without memory CONTROL or ALARM, and ``why`` says by what.
         ``first_hit`` and ``hit`` are shares of problems that a recalled plan fits; of recalled answers, if
-        one of the runs is of an earlier version, which does not say what fits.
+        one of the runs has rows of an earlier version, which do not say what fits.
     """
     pairs = _paired(first, other)
     if not pairs:
@@ -160,7 +160,7 @@ def verdict(rows: pd.DataFrame) -> str:
 def _paired(first: pd.DataFrame, other: pd.DataFrame) -> list[_Sides]:
     """The panels in which both attempted the same problems in the same ways."""
     shared = np.intersect1d(first["problem_id"], other["problem_id"])
-    if not all(rows["hit"].notna().any() for rows in (first, other)):
+    if not all((rows["hit"].notna() | rows["assist"].isin(WITHOUT_MEMORY)).all() for rows in (first, other)):
         first, other = (rows.assign(hit=None) for rows in (first, other))
     before, after = (
         {panel.name: panel for panel in panels(rows[rows["problem_id"].isin(shared)])}

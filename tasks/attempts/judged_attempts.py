@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from planners.attempt import Attempt
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.settings.errors import RunError
+
+if TYPE_CHECKING:  # pandas takes a fifth of a second to import, and making rows does not need it
+    import pandas as pd
 
 
 class PlanFaultError(RunError):
@@ -62,3 +66,12 @@ def judged_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], veh
     if right:
         accepted.add(plan)
     return replace(attempt, verified=right)
+
+
+def is_unaccepted(attempts: pd.DataFrame) -> pd.Series[bool]:
+    """Where ``attempts`` count as solved with plans that the authority did not accept.
+
+    Rows of before ``verified`` and ``polished`` were kept say nothing of that, and pass.
+    """
+    are_older = attempts[["verified", "polished"]].isna().all(axis=1)
+    return attempts["solved"] & ~attempts["verified"].eq(True) & ~are_older

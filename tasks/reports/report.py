@@ -42,6 +42,7 @@ from storage.places.run_folder import RunFolder
 from storage.tables.attempts import distinct_values, read_attempts
 from storage.tables.configurations import as_found
 from storage.tables.recalls import read_recalls
+from tasks.attempts.judged_attempts import is_unaccepted
 from tasks.fan_out.chunk import Chunk, run_folder
 from tasks.inputs.shortfalls import shortfalls
 from tasks.reports.report_details import page_of
@@ -121,9 +122,7 @@ def check_verified(attempts: pd.DataFrame) -> None:
     Raises:
         StorageError: there is such an attempt.
     """
-    if attempts[["verified", "polished"]].isna().all(axis=None):  # of before either was kept
-        return
-    wrong = attempts[attempts["solved"] & ~attempts["verified"].eq(True)]
+    wrong = attempts[is_unaccepted(attempts)]
     if len(wrong):
         first = wrong.iloc[0]
         raise StorageError(

@@ -39,7 +39,7 @@ from storage.tables.hallucinated import read_hallucinated_problems, read_labelle
 from storage.tables.recalls import read_recalls
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.attempt_rows import same_outcome
-from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
+from tasks.attempts.judged_attempts import PlanFaultError, check_attempt, is_unaccepted
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.requests.verify_plans import judged_stored_plans
@@ -220,15 +220,13 @@ def _champion(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
 def _attempts(
     data: str, settings: RunSettings, run: RunFolder, name: str, path: Path, sample: float
 ) -> Findings:
-    rows = _records(read_attempts(path))
+    attempts_of_file = read_attempts(path)
+    rows = _records(attempts_of_file)
     problem_source = held_back if path.is_relative_to(run.judged) else source_of
     source, vehicle = problem_source(data, settings, name), said_vehicle(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
-    wrong = [
-        f"{path}: the authority did not accept a plan for {row['problem_id']}"
-        for row in solved
-        if not row["verified"]
-    ]
+    unaccepted = attempts_of_file.loc[is_unaccepted(attempts_of_file), "problem_id"]
+    wrong = [f"{path}: the authority did not accept a plan for {identity}" for identity in unaccepted]
     memories = {
         (name, run_id): load_memory(
             (run.memory if run_id == settings.run_name else run.champion)(name), vehicle

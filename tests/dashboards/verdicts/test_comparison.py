@@ -84,7 +84,8 @@ def test_a_search_that_betters_what_fits_is_no_miss(run: pd.DataFrame) -> None:
 
 def test_runs_that_do_not_both_tell_hits_are_compared_by_recalled_answers(run: pd.DataFrame) -> None:
     fits_everywhere = run.assign(hit=run["memory"].notna())
-    for older in (run, run.assign(hit=None)):
+    again = run["problem_class"] == "trap"  # measured again by a later version
+    for older in (run, run.assign(hit=None), run.assign(hit=fits_everywhere["hit"].where(again))):
         rows = _compare(older, fits_everywhere)
         assert 0.0 < rows["hit"].max() < 1.0
         assert rows["hit"].equals(rows["first_hit"])

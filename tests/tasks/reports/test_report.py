@@ -45,10 +45,11 @@ def grown(data: Path, settings: RunSettings) -> pd.DataFrame:
 
 @pytest.mark.parametrize("said", [False, None])
 def test_no_report_is_made_of_plans_that_the_authority_did_not_accept(tmp_path: Path, said: object) -> None:
-    rows = [{**ATTEMPT, "verified": True}, {**ATTEMPT, "solved": False, "verified": None}]
+    attempt = {**ATTEMPT, "polished": False}
+    rows = [{**attempt, "verified": True}, {**attempt, "solved": False, "verified": None}]
     write_attempts(tmp_path / "right.parquet", rows)
     check_verified(read_attempts(tmp_path / "right.parquet"))
-    write_attempts(tmp_path / "wrong.parquet", [*rows, {**ATTEMPT, "verified": said}])
+    write_attempts(tmp_path / "wrong.parquet", [*rows, {**attempt, "verified": said}])
     with pytest.raises(StorageError, match=f"1 of 3 attempts count as solved .* {ATTEMPT['problem_id']} by"):
         check_verified(read_attempts(tmp_path / "wrong.parquet"))
 
@@ -58,8 +59,10 @@ def test_rows_without_an_answer_of_the_authority_pass_only_if_older_than_the_col
     write_attempts(tmp_path / "unjudged.parquet", [unjudged])
     with pytest.raises(StorageError, match="1 of 1 attempts"):
         check_verified(read_attempts(tmp_path / "unjudged.parquet"))
-    write_attempts(tmp_path / "old.parquet", [{**unjudged, "polished": None}])
-    check_verified(read_attempts(tmp_path / "old.parquet"))
+    old = {**unjudged, "polished": None}
+    for rows in ([old], [old, {**unjudged, "verified": True}]):  # alone, or beside later ones
+        write_attempts(tmp_path / "old.parquet", rows)
+        check_verified(read_attempts(tmp_path / "old.parquet"))
 
 
 def test_claims_are_judged_a_second_time_by_the_largest_run_of_the_other_method(
