@@ -109,8 +109,10 @@ def with_interval(value: float, low: float, high: float, decimals: int = 0) -> s
     if math.isnan(value):
         return NOTHING
     shares = {"value": 100.0 * value, "low": 100.0 * low, "high": 100.0 * high}
-    ends = (f"{shares[end]:{4 + decimals}.{decimals}f}" for end in ("low", "high"))  # which align in a column
-    return Cell(f"{shares['value']:.{decimals}f} [{', '.join(ends)}]", **shares)
+    ends = (
+        f"{shares[end]:z{4 + decimals}.{decimals}f}" for end in ("low", "high")
+    )  # which align in a column
+    return Cell(f"{shares['value']:z.{decimals}f} [{', '.join(ends)}]", **shares)
 
 
 def value_of(cell: str) -> Any:

@@ -224,7 +224,7 @@ def driving_cells(row: Row, decimals: int = 1) -> list[str]:
     if row["assist"] == "none" or math.isnan(row["sooner_s"]):
         return [driving, NOTHING]
     ends = {"value": row["sooner_s"], "low": row["sooner_low_s"], "high": row["sooner_high_s"]}
-    sooner, low, high = (f"{each:+.{decimals}f}" for each in ends.values())
+    sooner, low, high = (f"{each:+z.{decimals}f}" for each in ends.values())
     return [driving, Cell(f"{sooner} [{low}, {high}]", **ends)]
 
 

@@ -73,7 +73,7 @@ def _cells(row: dict[Any, Any], decimals: int, in_turn: bool) -> list[str]:
         Cell(f"{first_ms:,.{decimals}f}→{other_ms:,.{decimals}f}", first=first_ms, other=other_ms),
         NOTHING
         if low != low
-        else Cell(f"{sooner:+.1f} [{low:+.1f}, {high:+.1f}]", value=sooner, low=low, high=high),
+        else Cell(f"{sooner:+z.1f} [{low:+z.1f}, {high:+z.1f}]", value=sooner, low=low, high=high),
         _both(row["first_solved"], row["solved"]),
         *([_interval(row, "reduction"), _interval(row, "mostly")] if in_turn else counted),
         f"{row['verdict']}: {row['why']}" if row["why"] else row["verdict"],

@@ -70,7 +70,7 @@ def map_chart(
             words = f"plan {number}: centroid"
             marks.append(Mark(centre, "disc", colours.get(number, GREY), words, address))
     if np.isfinite(c_0).all():
-        marks.append(Mark(c_0, "star", GREY, "c_0: problems that no plan solves"))
+        marks.append(Mark(c_0, "star", GREY, "centroid of problems that no plan solves"))
     if embedding is not None:
         here = plane.places(embedding[np.newaxis])[0].tolist()
         marks.append(Mark(here, "ring", VERMILLION, "the problem asked for"))
@@ -78,7 +78,8 @@ def map_chart(
         f"{len(places):,} hallucinated problems on the two axes along which their embeddings differ most "
         f"({100 * plane.share:.0f} % of all variance). Dots: problems, coloured for {len(coloured)} of "
         f"{count:,} plans; crosses: problems made for no plan; discs: centroids, each opens its plan; star: "
-        "c_0." + (" Ring: the problem asked for." if embedding is not None else "")
+        "centroid of problems that no plan solves."
+        + (" Ring: the problem asked for." if embedding is not None else "")
     )
     table = pd.DataFrame(places, columns=["first_axis", "second_axis"]).assign(plan=problems.plan_index)
     drawing = map_of(marks, "first principal axis", "second principal axis")
@@ -115,8 +116,8 @@ def weight_chart(recalls: FreshRecalls) -> Chart:
     falling = np.cumsum(np.sort(weights)[::-1]) / max(int(weights.sum()), 1)
     note = (
         f"Answer: the first free plan in the encoder's order. {int((weights == 0).sum())} of {plans} plans "
-        f"are never the answer to these {len(recalls.free):,} fresh problems, "
-        f"{int((~recalls.free.any(axis=0)).sum())} are free in none of them."
+        f"are never the answer to these {len(recalls.free):,} fresh problems; free in none of them: "
+        f"{int((~recalls.free.any(axis=0)).sum())}."
     )
     table = pd.DataFrame({"plan": range(plans), "answers": weights, "free": recalls.free.mean(axis=0)})
     line = Line("share of answers", *_curve(np.arange(1, plans + 1), falling), GREEN)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
-from dashboards.cells import NOTHING, PLANNING_TIME
+from dashboards.cells import NOTHING, PLANNING_TIME, decimal
 from dashboards.palette import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
 from dashboards.web.charts import Chart, Dot, Drawing, Line, dots, lines
 from dashboards.web.memory_versions import MemoryVersion
@@ -91,10 +92,9 @@ def watched_rows(seen: pd.DataFrame) -> list[dict[str, Any]]:
         {
             "when": f"{row['at']:%Y-%m-%d %H:%M} UTC", "memory": row["memory"],
             "configuration": row["configuration"], "problems": f"{row['problems']:,}",
-            "hits": f"{100 * row['hits'] / row['problems']:.1f}",
-            "promised": f"{100 * row['benchmark_hits'] / row['benchmark_problems']:.1f}",
-            "mean_ms": f"{row['mean_ms']:.2f}", "promised_ms": f"{row['benchmark_mean_ms']:.2f}",
-            "total_s": _seconds(row["total_s"]), "promised_s": _seconds(row["benchmark_total_s"]),
+            "hits": _led(_hits_percent(row, "benchmark_"), _hits_percent(row), 1),
+            "mean_ms": _led(row["benchmark_mean_ms"], row["mean_ms"], 2),
+            "total_s": _led(row["benchmark_total_s"], row["total_s"], 1),
             "verdict": _verdict(row),
         }
         for row in seen[::-1][:NEWEST].to_dict("records")
@@ -112,9 +112,14 @@ def _address(version: MemoryVersion, runs: set[str]) -> str:
     return f"/runs/{version.run}" if version.run in runs else ""
 
 
-def _seconds(value: float | None) -> str:
-    """A total time; a dash where an earlier version kept none."""
-    return NOTHING if value is None or np.isnan(value) else f"{value:.1f}"
+def _hits_percent(row: Mapping[Any, Any], of: str = "") -> float:
+    return 100.0 * float(row[f"{of}hits"] / row[f"{of}problems"])
+
+
+def _led(then: float | None, now: float | None, decimals: int) -> str:
+    """What was measured ``then`` and ``now``; without an arrow where one was not, as total times may be."""
+    before, after = (decimal(math.nan if each is None else each, decimals) for each in (then, now))
+    return after if NOTHING in (before, after) else f"{before}→{after}"
 
 
 def _verdict(row: Mapping[Any, Any]) -> str:

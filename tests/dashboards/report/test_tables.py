@@ -7,12 +7,13 @@ import re
 import pandas as pd
 import pytest
 
-from dashboards.cells import CellTable, count, decimal, percent
+from dashboards.cells import CellTable, count, decimal, percent, with_interval
 from dashboards.report.retrieval_tables import retrieval_markdown, retrieval_table
 from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
     as_csv,
+    driving_cells,
     experience_table,
     full_cells,
     summary_markdown,
@@ -52,6 +53,18 @@ def test_the_table_holds_every_planner_configuration_and_class() -> None:
         for planner in ("rrt", "gust", "follow")
         for each in ALL
     }
+
+
+def test_what_rounds_to_nothing_is_not_negative() -> None:
+    row = {
+        "assist": "open",
+        "driving_s": 20.0,
+        "sooner_s": -0.01,
+        "sooner_low_s": -0.02,
+        "sooner_high_s": 0.0,
+    }
+    cells = [decimal(-0.01, 1), with_interval(-1e-4, -2e-4, 0.0), *driving_cells(row)]
+    assert not re.search(r"-0(\.0)?\b", " ".join(cells))
 
 
 def test_no_column_is_cut_however_narrow_the_output() -> None:

@@ -7,6 +7,7 @@ import html
 import io
 import os
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,6 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dashboards.verdicts.comparison_words import NOT_SHOWN
+from dashboards.verdicts.drift import drifts
 from dashboards.web.attempt_rows import COLUMNS, attempts_of
 from dashboards.web.data_reader import DataReader
 from dashboards.web.memory_versions import MemoryVersion
@@ -32,12 +34,12 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, state_size
 from storage.archives.libraries import save_library
 from storage.exchange.problems import fields_of
-from storage.places.data_folder import DataFolder
+from storage.places.data_folder import DataFolder, open_data_folder
 from storage.tables.attempts import readable_attempts
-from storage.tables.watched import read_watched
+from storage.tables.watched import add_watched, read_watched
 from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.server import served
-from tests.dashboards.web.small_data import CLASS, VERSIONS, small_data, write_settings
+from tests.dashboards.web.small_data import CLASS, SEEN, VERSIONS, small_data, write_settings
 
 ADDRESSES = (
     "/", "/runs/first", "/runs/first?view=solved", "/runs/first?view=time", "/runs/first/problems",
@@ -251,6 +253,26 @@ def test_progress_shows_every_version_and_everything_seen_at_work(
     for name, count in (("retrainings", len(VERSIONS)), ("drift", len(seen))):
         rows = list(csv.reader(io.StringIO(client.get(f"/progress?as=csv&chart={name}").text)))
         assert len(rows) == 1 + count
+
+
+def test_what_progress_lacks_stands_below_what_it_has(tmp_path: Path) -> None:
+    write_settings(small_data(tmp_path / "alike").run("second"))  # as many experiences as the first
+    text = LocalClient(open_data_folder(tmp_path / "alike"), lambda: VERSIONS).get("/progress").text
+    assert 0 <= text.find('id="chart-runs"') < text.find("--continual all")
+    none = open_data_folder(tmp_path / "none")
+    text = LocalClient(none, lambda: VERSIONS).get("/progress").text
+    assert 0 <= text.find('id="chart-retrainings"') < text.find("<h2>Runs")
+
+
+def test_what_a_benchmark_did_not_measure_leads_nowhere(tmp_path: Path) -> None:
+    data = open_data_folder(tmp_path)
+    then, now = replace(SEEN, solved=0, total_s=0.0), replace(SEEN, total_s=5.5)
+    add_watched(
+        data.watched, [each.to_row() for each in drifts("docks/1", {"lattice": now}, {"lattice": then})]
+    )
+    text = LocalClient(data, tuple).get("/progress").text
+    assert re.search("<td[^>]*>5.5</td>", text)
+    assert "–→" not in text
 
 
 def test_progress_offers_the_ways_with_a_memory_but_not_what_they_are_compared_with(
