@@ -109,9 +109,7 @@ def with_interval(value: float, low: float, high: float, decimals: int = 0) -> s
     if math.isnan(value):
         return NOTHING
     shares = {"value": 100.0 * value, "low": 100.0 * low, "high": 100.0 * high}
-    ends = (
-        f"{shares[end]:z{4 + decimals}.{decimals}f}" for end in ("low", "high")
-    )  # which align in a column
+    ends = (f"{shares[end]:z{4 + decimals}.{decimals}f}" for end in ("low", "high"))  # they align in columns
     return Cell(f"{shares['value']:z.{decimals}f} [{', '.join(ends)}]", **shares)
 
 

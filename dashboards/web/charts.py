@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -73,24 +73,36 @@ class Mark(NamedTuple):
 
 
 def dots(
-    title: str,
-    rows: Sequence[Dot],
+    titled: Iterable[tuple[str, Sequence[Dot]]],
     axis: str,
     ends: tuple[float, float],
     of_axis: type[Axis] = Scale,
-) -> Drawing:
-    """Dots with their intervals, one a row, and a line where nothing differs: at 0, or at 1 for ratios.
+) -> list[Drawing]:
+    """Drawings of dots with their intervals, one a row, and a line where nothing differs: at 0, or at 1.
 
-    An arrow stands for a dot beyond the axis, and for an interval that goes on beyond it.
+    An arrow stands for a dot beyond the axis, and for an interval that goes on beyond it. The axes of all
+    drawings are equally long.
 
     Args:
-        title: title of the drawing.
-        rows: the dots, from top to bottom.
+        titled: of each drawing its title, and the dots from top to bottom.
         axis: name of the axis.
         ends: lowest and highest value on the axis.
-        of_axis: the kind of axis; LogScale for ratios.
+        of_axis: the kind of axis; LogScale for ratios, among which nothing differs at 1.
     """
-    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends, of_axis)
+    drawn = list(titled)
+    left = _beside([row.label for _, rows in drawn for row in rows])
+    return [_dots(title, rows, left, axis, ends, of_axis) for title, rows in drawn]
+
+
+def _dots(
+    title: str,
+    rows: Sequence[Dot],
+    left: float,
+    axis: str,
+    ends: tuple[float, float],
+    of_axis: type[Axis],
+) -> Drawing:
+    scale, bottom, marks = _rows_with_axis(len(rows), left, axis, ends, of_axis)
     same = 1.0 if of_axis is LogScale else 0.0
     if ends[0] < same < ends[1]:
         marks.append(element("line", x1=scale.at(same), x2=scale.at(same), y1=4.0, y2=bottom, class_="zero"))
@@ -121,23 +133,33 @@ def dots(
 
 
 def stacks(
-    title: str,
-    rows: Mapping[str, Sequence[tuple[str, float]]],
+    titled: Mapping[str, Mapping[str, Sequence[tuple[str, float]]]],
     colours: Mapping[str, str],
     axis: str,
     unit: str,
-) -> Drawing:
-    """Bars made of parts, one a row.
+) -> list[Drawing]:
+    """Drawings of bars made of parts, one a row; their axes are equally long, each with ends of its own.
 
     Args:
-        title: title of the drawing.
-        rows: names and sizes of the parts by label.
+        titled: of each drawing, by title, the names and sizes of the parts by label.
         colours: colour of each part, by its name.
         axis: name of the axis.
         unit: unit of the sizes, in tooltips.
     """
+    left = _beside([label for rows in titled.values() for label in rows])
+    return [_stacks(title, rows, left, colours, axis, unit) for title, rows in titled.items()]
+
+
+def _stacks(
+    title: str,
+    rows: Mapping[str, Sequence[tuple[str, float]]],
+    left: float,
+    colours: Mapping[str, str],
+    axis: str,
+    unit: str,
+) -> Drawing:
     end = 1.05 * max((sum(size for _, size in parts) for parts in rows.values()), default=1.0)
-    scale, bottom, marks = _rows_with_axis(list(rows), axis, (0.0, end))
+    scale, bottom, marks = _rows_with_axis(len(rows), left, axis, (0.0, end))
     for i, (label, parts) in enumerate(rows.items()):
         y = 11.5 + _ROW * i
         marks.append(text(label, scale.first - 8.0, y + 11.0, class_="label", text_anchor="end"))
@@ -261,12 +283,16 @@ def _drawn(mark: Mark, x: float, y: float) -> str:
             return element("polygon", words, points=points(corners), class_="star")
 
 
+def _beside(labels: Sequence[str]) -> float:
+    """Where an axis begins that stands beside ``labels``, in pixels."""
+    return 14.0 + _LETTER * max((len(label) for label in labels), default=0)
+
+
 def _rows_with_axis(
-    labels: Sequence[str], axis: str, ends: tuple[float, float], of_axis: type[Axis] = Scale
+    rows: int, left: float, axis: str, ends: tuple[float, float], of_axis: type[Axis] = Scale
 ) -> tuple[Axis, float, list[str]]:
-    """The scale beside the labels of some rows, where it lies, and its marks."""
-    left = 14.0 + _LETTER * max((len(label) for label in labels), default=0)
-    scale, bottom = of_axis(*ends, left, WIDTH - 16.0), 8.0 + _ROW * len(labels)
+    """The scale that begins at ``left`` below so many ``rows``, where it lies, and its marks."""
+    scale, bottom = of_axis(*ends, left, WIDTH - 16.0), 8.0 + _ROW * rows
     return scale, bottom, [_x_axis(scale, bottom, axis)]
 
 

@@ -146,11 +146,12 @@ def _widened(value: float) -> float:
 
 
 def _round_step(step: float) -> float:
-    """The next of 1, 2, 5, 10 … times a power of ten."""
+    """The nearest of 1, 2, 5, 10 … times a power of ten."""
     if not step > 0.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(step))
-    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= step * 0.999)
+    steps = [factor * power for factor in (1.0, 2.0, 5.0, 10.0)]
+    return min(steps, key=lambda each: abs(math.log(each / step)))
 
 
 def _written(value: object) -> str:

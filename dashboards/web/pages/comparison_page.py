@@ -75,8 +75,7 @@ def compared(data: DataReader, one: RunFolder, two: RunFolder) -> pd.DataFrame:
 
 
 def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
-    drawings = []
-    ends = _ends(table)
+    panels = []
     for (panel, planner), rows in table.groupby(["panel", "planner"], sort=False):
         title = panel_title(str(panel), str(planner))
         rows_of_panel = []
@@ -89,8 +88,7 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
             rows_of_panel.append(
                 Dot(row["configuration"], (100.0 * less, 100.0 * low, 100.0 * high), colour, words)
             )
-        axis = "fewer collision checks than the first run, %"
-        drawings.append(dots(title, rows_of_panel, axis, ends, WideScale))
+        panels.append((title, rows_of_panel))
     return Chart(
         "comparison",
         "How much less work the other run needs",
@@ -98,7 +96,7 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
         "changes, with 95 % intervals that hold for all rows at once. Beyond 100 and −100 the axis is "
         "logarithmic. Colours say what is better or worse by problems solved, then seconds of driving, then "
         "checks, expansions and hits.",
-        drawings,
+        dots(panels, "fewer collision checks than the first run, %", _ends(table), WideScale),
         table,
         [(GREEN, BETTER), (VERMILLION, WORSE), (BLUE, ALARM), (GREY, SAME)],
     )

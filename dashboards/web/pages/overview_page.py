@@ -22,7 +22,7 @@ from dashboards.report.findings import findings, for_pages
 from dashboards.report.tables import driving_cells, reduction_cell
 from dashboards.statistics.distributions import TIME_PARTS, time_split
 from dashboards.statistics.panels import COMBINED, PLANNERS, ranked
-from dashboards.web.charts import Chart, Dot, Drawing, dots, stacks
+from dashboards.web.charts import Chart, Dot, dots, stacks
 from dashboards.web.data_reader import DataReader, class_names, stamp_of
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
@@ -162,7 +162,7 @@ def _reduction_chart(summary: pd.DataFrame, run: str, origin: str) -> Chart:
         "Mean planning time of the same planner without memory over that with memory, paired by problem, "
         "with 95 % bootstrap intervals; right of the line at 1 is faster. Arrows: the interval goes on. "
         f"{PLANNING_TIME} {origin}",
-        [dots(title, of_panel, "times faster", ends, LogScale) for title, of_panel in panels],
+        dots(panels, "times faster", ends, LogScale),
         rows,
         list(legend.items()),
     )
@@ -179,7 +179,7 @@ def _solved_chart(summary: pd.DataFrame, run: str) -> Chart:
         "solved",
         "Share of the problems that were solved",
         "Attempts without a plan count in every time, however they ended.",
-        [dots(title, of_panel, "problems solved, %", (lowest, 100.0)) for title, of_panel in panels],
+        dots(panels, "problems solved, %", (lowest, 100.0)),
         summary[["panel", "planner", "configuration", "problems", "solved"]],
     )
 
@@ -192,19 +192,18 @@ def _time_chart(data: DataReader, run: RunFolder) -> Chart:
         return time_split(as_found(frame).astype({"recall": object, "assist": object}))
 
     split = data.kept(("time split", stamp_of(run.results)), made)
-    drawings: list[Drawing] = []
-    for (panel, planner), rows in split.groupby(["panel", "planner"], sort=False):
-        parts = {
+    parts = {
+        panel_title(str(panel), str(planner)): {
             str(label): list(zip(of_label["part"], of_label["ms"].tolist(), strict=True))
             for label, of_label in rows.groupby("configuration", sort=False)
         }
-        title = panel_title(str(panel), str(planner))
-        drawings.append(stacks(title, parts, TIME_COLOURS, "mean planning time, ms", "ms"))
+        for (panel, planner), rows in split.groupby(["panel", "planner"], sort=False)
+    }
     return Chart(
         "time",
         "Where planning time goes",
         f"Mean milliseconds of each part over all problems. {PLANNING_TIME} Rest: in none of the parts.",
-        drawings,
+        stacks(parts, TIME_COLOURS, "mean planning time, ms", "ms"),
         split,
         [(colour, name) for name, colour in TIME_COLOURS.items()],
     )

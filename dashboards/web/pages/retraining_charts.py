@@ -30,10 +30,10 @@ def retraining_charts(versions: Sequence[MemoryVersion], runs: set[str]) -> Iter
     ends = [end for version in judged for end in (version.low_s, version.high_s)]
     room = 0.05 * max(max(0.0, *ends) - min(0.0, *ends), 0.01)
     across = (min(0.0, *ends) - room, max(0.0, *ends) + room)
-    drawings = []
-    for memory in dict.fromkeys(version.memory for version in judged):
-        rows = [_dot(version, runs) for version in judged if version.memory == memory]
-        drawings.append(dots(memory, rows, "sooner there than the champion, s", across))
+    of_memories = [
+        (memory, [_dot(version, runs) for version in judged if version.memory == memory])
+        for memory in dict.fromkeys(version.memory for version in judged)
+    ]
     verdicts = dict.fromkeys(version.verdict for version in judged)
     yield Chart(
         "retrainings",
@@ -41,7 +41,7 @@ def retraining_charts(versions: Sequence[MemoryVersion], runs: set[str]) -> Iter
         "How much sooner the robot is there, planning and driving counted, on held-back problems that both "
         "attempted, averaged over planners and configurations, with the 95 % interval that decided: right of "
         f"the line at 0 is sooner. {PLANNING_TIME}",
-        drawings,
+        dots(of_memories, "sooner there than the champion, s", across),
         pd.DataFrame(versions),
         [(_colour(verdict), verdict or "not judged yet") for verdict in verdicts],
     )

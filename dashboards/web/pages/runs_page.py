@@ -33,7 +33,7 @@ def runs(data: DataReader, params: Parameters) -> Page:
 
 def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
     when = datetime.fromtimestamp(run.settings.stat().st_mtime, UTC)
-    row: dict[str, Any] = {"name": run.path.name, "when": f"{when:%Y-%m-%d %H:%M} UTC", "fault": ""}
+    row: dict[str, Any] = {"name": run.path.name, "when": f"{when:%Y-%m-%d %H:%M}", "fault": ""}
     try:
         settings, vehicle = data.settings(run), name_of(data.vehicle(run))
         stages = list(dict.fromkeys(str(stage.get("stage")) for stage in data.stages(run)))
