@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,7 +13,7 @@ from dashboards.web.parameters import Parameters
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.classes.families import families_of
-from planners.world.classes.problem_classes import CLASSES
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.places.run_folder import RunFolder
@@ -60,6 +62,13 @@ def _bench_of_library(data: DataReader, name: str) -> Bench:
     own, others = f"{data.folder.libraries.name}/{name}", data.libraries_for(facts.vehicle)
     names = [own, *(other for other in others if other != own)]
     drawable = (*families_of(facts.vehicle), *CLASSES)
-    asked = {question.partition("-standard-")[0] for question in facts.questions}
-    first = next((each for each in drawable if each in asked), "random")
-    return Bench(data, None, facts.vehicle, names, drawable, first, "standard")
+    first, difficulty = _mostly_asked(facts.questions, drawable)
+    return Bench(data, None, facts.vehicle, names, drawable, first, difficulty)
+
+
+def _mostly_asked(questions: Sequence[str], drawable: Sequence[str]) -> tuple[str, str]:
+    """The class or family among ``drawable`` of most ``questions``, by their ids, and its difficulty."""
+    named = re.compile(f"({'|'.join(drawable)})-(?:({'|'.join(DIFFICULTIES)})-)?")
+    asked = Counter(match.groups("standard") for each in questions if (match := named.match(each)))
+    ((first, difficulty), _), *_ = asked.most_common(1) or [(("random", "standard"), 0)]
+    return first, difficulty

@@ -17,6 +17,7 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle, state_size
 from storage.archives.libraries import save_library
 from storage.places.data_folder import open_data_folder
+from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.server import served
 
 
@@ -67,6 +68,28 @@ def test_a_library_is_tried_as_the_memory_of_a_run_is(client: httpx.Client) -> N
     answers = client.post("/libraries/docks/plan", json=asked).json()["answers"]
     assert [answer["assist"] for answer in answers] == ["none", "repair"]
     assert all(answer["solved"] for answer in answers)
+
+
+@pytest.mark.parametrize(
+    ("questions", "opens"),
+    [
+        (["dock-hard-1-0", "dock-hard-1-1", "yard-standard-1-0"], "dock-hard"),
+        (["dock-standard-1-0", "yard-easy-1-0", "yard-easy-1-1"], "yard-easy"),
+        (["yard-0a1b2c3d4e5f"], "yard-standard"),  # learned on the job
+        (["trap-hard-1-0-question-0"], "trap-hard"),
+        (["denver-12-question-0", "docking-hard-1-0"], "random-standard"),
+    ],
+)
+def test_a_library_opens_with_a_world_as_most_of_its_questions(
+    tmp_path: Path, questions: list[str], opens: str
+) -> None:
+    data = open_data_folder(tmp_path)
+    _save(data.libraries / "mine", CAR_1_TRAILER, *questions)
+    shown = re.search(
+        'id="start-world">(.*?)</script>', LocalClient(data, tuple).get("/libraries/mine/try").text
+    )
+    assert shown is not None
+    assert json.loads(shown[1])["world"]["id"].startswith(f"{opens}-")
 
 
 @pytest.mark.parametrize(
