@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
+
 from flows.cli.terminal import show_notices
 from flows.retrain import retrain as retrain_flow
 from flows.retrain_library import retrain_library as retrain_library_flow
@@ -12,4 +15,6 @@ retrain = started_by_prefect(retrain_flow)
 retrain_library = started_by_prefect(retrain_library_flow)
 
 show_notices()
+with suppress(PermissionError):  # if it leads a group already
+    os.setpgid(0, 0)  # Ctrl-C is for `serve`, which ends this process and its workers
 end_with_parent()  # even if `serve` is killed; Prefect's own server ends, too

@@ -9,8 +9,9 @@ import asyncio
 import json
 import logging
 import signal
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -26,6 +27,7 @@ from tasks.settings.run_settings import RunSettings
 if TYPE_CHECKING:
     from prefect import Flow
     from prefect.deployments.runner import RunnerDeployment
+    from prefect.runner import Runner
 
 DAY: Final = 86_400.0
 NAME: Final = "scheduled"
@@ -196,8 +198,31 @@ def _run(deployment: RunnerDeployment) -> None:
 
     runner = Runner("motion-memory", query_seconds=QUERY_SECONDS, limit=1)
     runner.add_deployment(deployment)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # lets asyncio stop the runner cleanly
-    asyncio.run(runner.start())
+    with _ctrl_c_kept_from_children(), suppress(asyncio.CancelledError):
+        asyncio.run(_until_ctrl_c(runner))
+    raise KeyboardInterrupt
+
+
+async def _until_ctrl_c(runner: Runner) -> None:
+    working = asyncio.ensure_future(runner.start())
+    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, working.cancel)
+    await working
+
+
+@contextmanager
+def _ctrl_c_kept_from_children() -> Iterator[None]:
+    """Let Ctrl-C reach this process alone: a retraining that is starting would print where it was.
+
+    Children inherit the signals that this thread has blocked; another thread gets them instead.
+    """
+    done = threading.Event()
+    threading.Thread(target=done.wait, daemon=True).start()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        done.set()
 
 
 def _end_children() -> None:

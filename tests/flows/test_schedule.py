@@ -107,8 +107,9 @@ def test_a_schedule_retrains_on_what_was_learned_in_between(
     _wait(lambda: _automated(data), process, log)
 
     family = psutil.Process(process.pid).children(recursive=True)
-    process.send_signal(signal.SIGINT)
+    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does
     assert process.wait(timeout=60) == 130, log.read_text()[-3000:]
+    assert "Traceback" not in log.read_text()  # of the retraining that was starting
     _, alive = psutil.wait_procs(family, timeout=20)
     assert not alive
     assert running_server(data) is None
