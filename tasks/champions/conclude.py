@@ -112,7 +112,7 @@ def settle(registry: Registry, judged_versions: Sequence[tuple[Version, str]]) -
         except ChangedChampionError as error:
             faults.append(str(error))
             continue
-        registry.set_tags(version, {"verdict": verdict})
+        registry.set_verdict(version, verdict)
     return faults
 
 

@@ -139,7 +139,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
 def note_verdict(registry: Registry, champion: Version | None) -> None:
     """Note the verdict on a champion whose promotion was interrupted before the verdict was noted."""
     if champion is not None and champion.tag("key") and not champion.tag("verdict"):
-        registry.set_tags(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
+        registry.set_verdict(champion, PROMOTED if champion.tag("previous") else FIRST)
 
 
 def _challenger_run(

@@ -81,7 +81,7 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
         except ChangedChampionError as error:
             faults.append(str(error))
             continue
-        registry.set_tags(challenger, {"verdict": PROMOTED})
+        registry.set_verdict(challenger, PROMOTED)
         registry.remove_alias(challenger.name, CHALLENGER)
         changes.append(ChampionChange(challenger.name, int(challenger.tag("against")), challenger.number))
     if faults:
@@ -134,7 +134,7 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
         found.append((champion, before))
     changes = []
     for champion, before in found:
-        registry.set_tags(champion, {"verdict": ROLLED_BACK})
+        registry.set_verdict(champion, ROLLED_BACK)
         # last: if the command is killed before this line, repeating it still goes back only one version
         registry.set_alias(before)
         changes.append(ChampionChange(champion.name, champion.number, before.number))

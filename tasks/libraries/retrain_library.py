@@ -241,7 +241,7 @@ def _registered(
     markdown = _markdown(made, verdict)
     key = key_of(made.title, logged.digest)
     version = registry.register(asked.registered, logged.run_id, logged.model_id, key, tags, markdown)
-    _log_judgement(folder, logged.run_id, verdict, made.judgement, markdown)
+    _log_judgement(folder, logged.run_id, made.judgement, markdown)
     return version, verdict, markdown
 
 
@@ -321,11 +321,10 @@ def _beside(judgement: LibraryJudgement) -> str:
 
 
 def _log_judgement(
-    folder: DataFolder, run_id: str, verdict: str, judgement: LibraryJudgement | None, markdown: str
+    folder: DataFolder, run_id: str, judgement: LibraryJudgement | None, markdown: str
 ) -> None:
-    """Add the verdict and its figures to the library's run in MLflow."""
+    """Add the figures and the text of the verdict to the library's run in MLflow."""
     log = tracker(folder.place)
-    log.tag(run_id, {"verdict": verdict})
     if judgement is not None:
         ends = {name: getattr(judgement.alone, name) for name in ("sooner_s", "low_s", "high_s")}
         log.metrics(run_id, [{f"beside-alone/{name}": value for name, value in ends.items()}])

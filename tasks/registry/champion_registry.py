@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -139,6 +139,16 @@ class Registry:
             for tag, text in texts.items():
                 client.set_model_version_tag(version.name, str(version.number), _TAG + tag, text)
         return version._replace(tags={**version.tags, **texts})
+
+    def set_verdict(self, version: Version, verdict: str) -> None:
+        """Note what became of a version, also at the run that made it, which MLflow's table of runs shows."""
+        self.set_tags(version, {"verdict": verdict})
+        with self._client() as client:
+            from mlflow.exceptions import MlflowException
+
+            run_id = client.get_model_version(version.name, str(version.number)).run_id
+            with suppress(MlflowException):  # somebody has deleted the run
+                client.set_tag(run_id, "verdict", verdict)
 
     def set_alias(self, version: Version, alias: str = CHAMPION) -> None:
         """Point an alias at a version. This is the one step by which a champion changes."""

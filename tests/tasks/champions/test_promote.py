@@ -163,6 +163,24 @@ def test_other_memories_have_their_verdicts_beside_one_whose_champion_has_change
     assert [registry.versions(name)[-1].tag("verdict") for name in names] == ["", PROMOTED, PROMOTED]
 
 
+def test_the_run_that_made_a_version_says_what_became_of_it(registered: Registered) -> None:
+    from mlflow import MlflowClient
+
+    def told() -> str:
+        return str(client.get_run(registered.run_id).data.tags["verdict"])
+
+    registry, client = registered.registry, MlflowClient(registered.registry.uri)
+    assert settle(registry, [(registered.version("one"), FIRST)]) == []
+    assert told() == FIRST
+    assert settle(registry, [(registered.version("two", against=1, retraining=1), AWAITING)]) == []
+    assert told() == AWAITING
+    promote_awaiting(registered.data, None)
+    assert told() == PROMOTED
+    client.delete_run(registered.run_id)  # which keeps no version from its verdict
+    roll_back(registered.data, None)
+    assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST, ROLLED_BACK]
+
+
 def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_again(
     registered: Registered, monkeypatch: pytest.MonkeyPatch
 ) -> None:
