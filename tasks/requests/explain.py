@@ -103,9 +103,8 @@ def _told_of(parts: SubPlanAnswer, attempt: Attempt, plans: str) -> str:
     if parts.plan is None:
         more = "" if attempt.solved else "; the search found no way either"
         return f"no parts of {plans}, alone or one after another, lead to the goal without a collision{more}"
-    if parts.recalled or attempt.source == KEPT:
-        better = BETTER[attempt.source or ""]
-        found = f"lead to the goal in {parts.plan.duration_s:.1f} s; {better}"
+    if attempt.source in BETTER and (parts.recalled or attempt.source == KEPT):
+        found = f"lead to the goal in {parts.plan.duration_s:.1f} s; {BETTER[attempt.source]}"
     else:
         found = (
             "make up less than half of the way to the goal that was found with them: it counts as searched"

@@ -35,16 +35,15 @@ def bound(host: str, port: int) -> socket.socket:
     """
     if not 0 <= port <= 65_535:
         raise UsageError(f"Port {port}: give one from 1 to 65535, or 0 for a free one.")
+    listener = None
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listener = socket.socket(family, kind, protocol)
-        try:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind(address)
-        except OSError:
-            listener.close()
-            raise
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
     except OSError as error:
+        if listener is not None:
+            listener.close()
         raise RunError(
             f"Port {port} on {host} cannot be used ({error.strerror}); give another one."
         ) from None
