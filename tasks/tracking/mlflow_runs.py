@@ -27,6 +27,7 @@ from tasks.tracking.tracking_address import tracking_uri
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
+    from mlflow.entities import LoggedModel
 
 EXPERIMENT: Final = "motion-memory"
 RUN_TAG: Final = "motion_memory.run"  # the name of the run's folder
@@ -201,7 +202,7 @@ class Tracker:
                 self._client.log_artifact(run_id, str(file), under)
 
     def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
-        """Log a memory's archive as a model that the run made.
+        """Log a memory's archive as a model that the run made; one that was begun and killed is finished.
 
         Args:
             run_id: the MLflow run.
@@ -217,8 +218,12 @@ class Tracker:
 
         from tasks.tracking.memory_model import save_memory_model
 
-        logged_model = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
-        self._client.log_outputs(run_id, [LoggedModelOutput(logged_model.model_id, step=0)])
+        logged_model = self._begun_model(run_id, name)
+        if logged_model is None:
+            logged_model = self._client.create_logged_model(
+                self._experiment, name, run_id, model_type="memory"
+            )
+            self._client.log_outputs(run_id, [LoggedModelOutput(logged_model.model_id, step=0)])
         with scratch_folder() as scratch:
             folder = scratch / name
             model = Model(logged_model.artifact_location, run_id)
@@ -227,6 +232,11 @@ class Tracker:
             self._client.log_model_artifacts(logged_model.model_id, str(folder))
         self._client.finalize_logged_model(logged_model.model_id, "READY")
         return str(logged_model.model_id)
+
+    def _begun_model(self, run_id: str, name: str) -> LoggedModel | None:
+        """A model that a command which was killed began to log; None if there is none."""
+        models = self._client.search_logged_models([self._experiment], f"source_run_id = '{run_id}'")
+        return next((each for each in models if (each.name, each.status) == (name, "PENDING")), None)
 
     def model_of(self, run_name: str, memory: str) -> str | None:
         """The id of the last model that a run has logged for a memory, or None."""

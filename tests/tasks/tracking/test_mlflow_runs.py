@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from storage.archives.memories import save_memory
 from storage.places.data_folder import open_data_folder
 from tasks.tracking import runs_view
 from tasks.tracking.mlflow_runs import EXPERIMENT, Tracker
+from tests.prepared.mlflow_database import with_mlflow_database
+from tests.storage.samples import a_memory
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of MLflow's libraries among themselves
 
@@ -35,6 +38,36 @@ def test_a_command_killed_while_it_makes_the_database_leaves_none_and_the_next_o
     assert Tracker(data).find("run", "run") is None
     assert data.mlflow_database.stat().st_mode & 0o777 == 0o600  # whatever the folder's own says
     assert not seen[0].exists()
+
+
+@pytest.mark.parametrize(
+    "killed_in",
+    ["tasks.tracking.memory_model.save_memory_model", "mlflow.MlflowClient.log_model_artifacts"],
+)
+def test_a_command_killed_while_it_logs_a_model_leaves_one_that_the_next_one_finishes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed_in: str
+) -> None:
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    save_memory(tmp_path / "archive", a_memory(3))
+    tracker = Tracker(open_data_folder(with_mlflow_database(tmp_path / "data")))
+
+    def killed(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    def logged() -> str:
+        with tracker.run("r", "train trap", {}) as run_id:
+            return tracker.memory(run_id, "memory", tmp_path / "archive", "car")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(killed_in, killed)
+        with pytest.raises(KeyboardInterrupt):
+            logged()
+    model_id = logged()
+    experiment = tracker._client.get_experiment_by_name(EXPERIMENT)
+    assert experiment is not None
+    (model,) = tracker._client.search_logged_models([experiment.experiment_id])
+    assert (model.model_id, model.status) == (model_id, "READY")
+    assert logged() != model_id  # one that is finished stays as it is
 
 
 def test_the_experiment_has_a_view_that_shows_what_runs_gain_and_a_changed_one_is_kept(
