@@ -25,7 +25,7 @@ from dashboards.cells import (
 )
 from dashboards.statistics.panels import PLANNERS, ranked
 from dashboards.verdicts.claim_rules import Claim
-from planners.attempt import SOURCES
+from planners.attempt import SOURCES, WITHOUT_MEMORY
 from storage.tables.configurations import configurations_in
 
 Row = Mapping[Any, Any]  # of a summary
@@ -200,8 +200,8 @@ def full_cells(row: Row, decimals: int) -> list[str]:
 
 
 def _of_memory(row: Row, name: str) -> str:
-    """A share in a ``row`` of a summary that only a memory can have; a dash for the planner alone."""
-    return NOTHING if row["assist"] == "none" else percent(row[name])
+    """A share in a ``row`` of a summary that only a memory can have; a dash without one."""
+    return NOTHING if row["assist"] in WITHOUT_MEMORY else percent(row[name])
 
 
 def reduction_cell(row: Row, decimals: int = 1) -> str:
@@ -235,7 +235,7 @@ def _cells(row: Row, decimals: int) -> list[str]:
         decimal(row["mean_ms"], decimals),
         reduction_cell(row, 0),
         percent(row["slower"]),
-        NOTHING if row["assist"] == "none" else _hits(row),
+        NOTHING if row["assist"] in WITHOUT_MEMORY else _hits(row),
         *driving_cells(row),
     ]
 

@@ -17,6 +17,7 @@ from dashboards.cells import (
     titled_tables,
     with_interval,
 )
+from dashboards.verdicts.comparison import ALARM, CONTROL
 
 _SHARED: Final = ("planner", "configuration", "ms", "sooner s", "solved %")
 HEADINGS: Final = (*_SHARED, "fewer checks %", "hits %", "verdict")
@@ -66,7 +67,9 @@ def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
 def _cells(row: dict[Any, Any], decimals: int, in_turn: bool) -> list[str]:
     sooner, low, high = row["sooner_s"], row["sooner_low_s"], row["sooner_high_s"]
     first_ms, other_ms = row["first_ms"], row["ms"]
-    counted = [_interval(row, "checks_reduction"), _both(row["first_hit"], row["hit"])]
+    uses_memory = row["verdict"] not in (CONTROL, ALARM)
+    hits = _both(row["first_hit"], row["hit"]) if uses_memory else NOTHING
+    counted = [_interval(row, "checks_reduction"), hits]
     return [
         row["planner"],
         row["configuration"],

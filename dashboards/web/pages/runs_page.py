@@ -74,7 +74,8 @@ def _result(data: DataReader, run: RunFolder) -> str:
         return NOTHING
     faster, sooner_s = times_faster(own), used_by_default(own)["sooner_s"].mean()
     arrives = "sooner" if sooner_s >= 0.0 else "later"
-    return f"{faster:.1f} × faster" + ("" if sooner_s != sooner_s else f", {abs(sooner_s):.1f} s {arrives}")
+    told = f"{faster:.1f} × faster", "" if sooner_s != sooner_s else f"{abs(sooner_s):.1f} s {arrives}"
+    return ", ".join(each.replace(" ", "\N{NO-BREAK SPACE}") for each in told if each)
 
 
 def _took(data: DataReader, run: RunFolder) -> str:

@@ -22,7 +22,7 @@ from dashboards.report.tables import (
 from dashboards.statistics.panels import summarise
 from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_retrieval
 from flows.cli.terminal import write
-from planners.attempt import SOURCES
+from planners.attempt import SOURCES, WITHOUT_MEMORY
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
 
@@ -65,6 +65,12 @@ def test_what_rounds_to_nothing_is_not_negative() -> None:
     }
     cells = [decimal(-0.01, 1), with_interval(-1e-4, -2e-4, 0.0), *driving_cells(row)]
     assert not re.search(r"-0(\.0)?\b", " ".join(cells))
+
+
+def test_hits_are_shown_where_there_is_a_memory_and_nowhere_else(attempt_rows: pd.DataFrame) -> None:
+    for _, row in summarise(attempt_rows, resamples=10).iterrows():
+        cells = dict(zip(FULL_HEADINGS[2:], full_cells(row, 2), strict=True))
+        assert (cells["hits %"] == NOTHING) == (row["assist"] in WITHOUT_MEMORY)
 
 
 def test_no_column_is_cut_however_narrow_the_output() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dashboards.cells import as_markdown
+from dashboards.cells import NOTHING, as_markdown
 from dashboards.verdicts.comparison import (
     ALARM,
     BETTER,
@@ -194,3 +194,6 @@ def test_both_forms_show_every_line(run: pd.DataFrame) -> None:
     text = as_markdown(comparison_tables(rows))
     assert text.count("\n|") == len(rows) + 3 * 2
     assert len(comparison_tables(rows)) == 3
+    for table in comparison_tables(rows):
+        for cells in (cells for group in table.groups for cells in group):
+            assert (cells[-2] == NOTHING) == cells[-1].startswith(CONTROL)  # hits are of memories

@@ -129,7 +129,7 @@ def test_a_summary_of_before_answers_were_polished_is_shown_and_is_of_plans_as_f
             httpx.Client(base_url=address, timeout=60.0) as reading,
         ):
             assert reading.get("/runs/first").status_code == 200
-            shown.append(re.findall(r"[\d.]+ × faster", reading.get("/").text))
+            shown.append(re.findall(r"[\d.]+\s×\sfaster", reading.get("/").text))
     assert shown[0]
     assert shown[0] == shown[1]  # polished rows do not enter it
 
