@@ -27,6 +27,7 @@ def problem_of_arrays(
     start_motion: tuple[float, ...],
     arrival: Arrival | None,
     vehicle: Vehicle,
+    driving: bool,
 ) -> Problem:
     """Make a problem of what ``Memory.plan_arrays`` is given.
 
@@ -41,6 +42,7 @@ def problem_of_arrays(
         start_motion: the entries of the start state after the pose.
         arrival: what the goal asks for besides the place.
         vehicle: the vehicle that drives.
+        driving: whether it drives along a plan: as of ``problem_fault``.
 
     Raises:
         ValueError: an array has another shape, the goal is a pose and there is an arrival too, or the problem
@@ -58,6 +60,7 @@ def problem_of_arrays(
         scale=scale_for_vehicle(scale, vehicle),
         start_motion=motion_given("start_motion", start_motion),
         arrival=asked.arrival,
+        driving=driving,
     )
 
 

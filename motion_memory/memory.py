@@ -32,7 +32,7 @@ from planners.world.alignment import (
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, Plan, Problem, start_state
-from planners.world.vehicles.vehicle import Vehicle, in_short_steps, name_of
+from planners.world.vehicles.vehicle import Vehicle, name_of
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
@@ -98,7 +98,7 @@ class Memory:
         """
         began = perf_counter()
         return self._planned(
-            self._read(problem, self._seen_by(current)), began, time_limit, improve_seconds, current
+            self._read(problem, current is not None), began, time_limit, improve_seconds, current
         )
 
     def plan_arrays(
@@ -148,7 +148,8 @@ class Memory:
         began = perf_counter()
         problem = problem_of_arrays(
             *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
-            vehicle=self._seen_by(current),
+            vehicle=self.vehicle,
+            driving=current is not None,
         )
         return self._planned(problem, began, time_limit, improve_seconds, current)
 
@@ -206,7 +207,7 @@ class Memory:
             raise ValueError(f"k is {k!r}: give a whole number, 1 or more")
         if self.stored is None:
             raise UsageError("Nothing can be recalled without a memory: name one where you call load.")
-        read = self._read(problem, self.vehicle)
+        read = self._read(problem)
         fault = scale_fault(self.stored, read.scale)
         if fault is not None:
             raise ValueError(fault)
@@ -228,7 +229,7 @@ class Memory:
             ValueError: The problem is malformed or impossible.
         """
         check_plan("plan", plan)
-        read = self._read(problem, self.vehicle)
+        read = self._read(problem)
         return faults(read, to_problem_frame(plan, read), self.vehicle)
 
     def learn(self, answers: Answer | RouteAnswer | Iterable[Answer | RouteAnswer], data: str | Path) -> int:
@@ -269,18 +270,14 @@ class Memory:
                 solved.append(Solved(problem, check_attempt(problem, attempt, set(), vehicle)))
         return remember(Path(data), solved, self.vehicle)
 
-    def _seen_by(self, current: Plan | None) -> Vehicle:
-        """The vehicle for which the start must be free: one that drives may be near what it passes."""
-        return self.vehicle if current is None else in_short_steps(self.vehicle)
-
-    def _read(self, given: Problem | Mapping[str, Any] | str, vehicle: Vehicle) -> Problem:
+    def _read(self, given: Problem | Mapping[str, Any] | str, driving: bool = False) -> Problem:
         """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
         if isinstance(given, Problem):
             return given
         fields = _parsed(given) if isinstance(given, str) else given
         with suppress(ValueError):  # most hold what JSON holds, and need no second look
-            return problem_of(fields, "problem", vehicle)
-        return problem_of(plain(fields), "problem", vehicle)
+            return problem_of(fields, "problem", self.vehicle, driving)
+        return problem_of(plain(fields), "problem", self.vehicle, driving)
 
     def _planned(
         self,

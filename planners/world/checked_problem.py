@@ -34,6 +34,7 @@ def checked_problem(
     groups: list[int] | None = None,
     start_motion: tuple[float, ...] = (),
     arrival: Arrival | None = None,
+    driving: bool = False,
 ) -> Problem:
     """Make a problem in any frame, with obstacles of polygons that lie end to end in one array.
 
@@ -55,6 +56,7 @@ def checked_problem(
         start_motion: speed (m/s) at the start, then what else the vehicle's state has, such as the steering
             angle and the hitch angles; what is missing is 0.
         arrival: what is asked at the goal besides the place.
+        driving: whether the vehicle drives along a plan: as of ``problem_fault``.
 
     Raises:
         ValueError: A polygon is none, or the problem makes no sense (``problem_fault``).
@@ -90,7 +92,7 @@ def checked_problem(
         ends = np.cumsum([0, *groups])
         obstacles = obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
     problem = replace(problem, obstacles=obstacles)
-    fault = problem_fault(problem, vehicle)
+    fault = problem_fault(problem, vehicle, driving)
     if fault is not None:
         raise ValueError(fault)
     return problem

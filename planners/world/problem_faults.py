@@ -19,17 +19,25 @@ from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.vehicles.dynamics import lateral_acceleration, load, slides, swept_bodies, turn_limit
 from planners.world.vehicles.reach import REACH_M
-from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names, trailers_of
+from planners.world.vehicles.vehicle import (
+    CAR,
+    Vehicle,
+    in_short_steps,
+    name_of,
+    state_names,
+    trailers_of,
+)
 
 MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
 
 
-def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
+def problem_fault(problem: Problem, vehicle: Vehicle = CAR, driving: bool = False) -> str | None:
     """Return what is wrong with a problem and what to do about it, or None if it makes sense.
 
     The obstacles must be well formed. Checked are, in this order: the numbers (``frame_fault``), how the
     drive begins and is to end, and whether the footprint at the start and the goal's centre are free. Lengths
-    are told as they are outside, in real metres.
+    are told as they are outside, in real metres. Who is ``driving`` along a plan may start nearer to what it
+    passes than a new plan may.
     """
     fault = (
         frame_fault(problem)
@@ -44,7 +52,7 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
         problem.bounds,
         start_state(problem, vehicle)[np.newaxis],
         problem.goal,
-        vehicle,
+        in_short_steps(vehicle) if driving else vehicle,
     )
     if entries > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"

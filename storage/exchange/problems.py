@@ -57,7 +57,9 @@ def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
     return list(iterate_problems(path, vehicle))
 
 
-def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) -> Problem:
+def read_problem(
+    path: Path, vehicle: Vehicle = CAR, pick: str | None = None, driving: bool = False
+) -> Problem:
     """The one problem in the file at ``path`` that is asked for; only this one is checked.
 
     Args:
@@ -65,6 +67,7 @@ def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) ->
         vehicle: the vehicle that drives.
         pick: the id of the problem, or else its number as messages tell it: its line, or counted from 1. Its
             id and place are logged. None takes the only one.
+        driving: whether the vehicle drives along a plan: as of ``problem_fault``.
 
     Raises:
         StorageError: the file has no such problem, or several where none is picked; or it is malformed.
@@ -85,7 +88,7 @@ def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) ->
         ways = f"by its id (the first is {short(first_id)}) or its number (1 to {last})"
         choose = f"; choose one with --pick, {ways}" if count else ""
         raise StorageError(f"{path} holds {count:,} problem{'s' * (count != 1)}{asked}{choose}.")
-    ((where, problem),) = _checked(path, found, vehicle)
+    ((where, problem),) = _checked(path, found, vehicle, driving)
     if isinstance(problem, str):
         raise StorageError(ended(f"{where}: {problem}"))
     if pick is not None:
@@ -124,7 +127,12 @@ def problems_or_faults_of(piece: ProblemSlice, vehicle: Vehicle = CAR) -> Iterat
 
 
 def _checked(
-    path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle, *, warns: bool = True
+    path: Path,
+    raw: Iterable[tuple[int, Any]],
+    vehicle: Vehicle,
+    driving: bool = False,
+    *,
+    warns: bool = True,
 ) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
     told: set[str] = set()  # kinds of hints
@@ -137,7 +145,7 @@ def _checked(
         identity = fields.get("id") if isinstance(fields, Mapping) else None
         with_id = f"{where} (id {short(identity)})" if isinstance(identity, str) and identity else where
         try:
-            problem = problem_of(fields, _default_id(path, number), vehicle)
+            problem = problem_of(fields, _default_id(path, number), vehicle, driving)
             stated = isinstance(fields, Mapping) and stated_vehicle(fields) is not None
             first = stated if first is None else first
             if stated != first:
@@ -203,13 +211,14 @@ def write_problems(
             write_table(path, table_of([as_text(row) for row in rows], PROBLEMS, "problem"))
 
 
-def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
+def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR, driving: bool = False) -> Problem:
     """The problem that ``fields`` of the exchange format describe, checked for a ``vehicle``.
 
     Args:
         fields: the fields by name.
         default_id: its id if it has none.
         vehicle: the vehicle that drives.
+        driving: whether it drives along a plan: as of ``problem_fault``.
 
     Raises:
         ValueError: the fields describe no possible problem; the message says why.
@@ -245,6 +254,7 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         groups=groups_of(fields.get("groups"), len(polygons)),
         start_motion=start_motion_of(fields, vehicle),
         arrival=goal.arrival,
+        driving=driving,
     )
 
 

@@ -11,7 +11,6 @@ from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, in_canonical, to_canonical
 from planners.world.problem import Plan, Problem, start_state
-from planners.world.vehicles.vehicle import in_short_steps
 from storage.exchange.problems import read_problem
 from storage.places.data_folder import open_data_folder
 from tasks.attempts.timing import no_garbage_collection
@@ -75,8 +74,7 @@ def plan_one(
             no such problem, or ``learn`` is no data folder.
     """
     check_plan_outputs([file, *assistant.files], out, drawing)
-    seen_by = assistant.vehicle if current is None else in_short_steps(assistant.vehicle)
-    problem = read_problem(file, seen_by, pick)  # who drives may be near what it passes
+    problem = read_problem(file, assistant.vehicle, pick, driving=current is not None)
     driven, near = None, None  # the plan that is being driven, and whether the robot is near it
     if current is not None:
         driven = current_plan(current, assistant.vehicle, problem.scale, problem.offset)

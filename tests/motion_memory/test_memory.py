@@ -24,6 +24,7 @@ from storage.errors import StorageError
 from storage.exchange.problems import fields_of
 from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.settings.errors import RunError, UsageError
+from tests import worlds
 from tests.storage.samples import box
 from tests.tasks.served import problem, write_memory
 
@@ -219,3 +220,35 @@ def test_the_current_plan_is_numbers_of_any_kind_and_nothing_else(planner: Memor
     ):
         with pytest.raises(UsageError, match="current"):
             planner.plan(moved, current=wrong)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_only_who_drives_a_plan_may_be_within_the_margins_of_what_it_passes(scale: float) -> None:
+    asked = fields_of(replace(problem(0), obstacles=obstacles_of([]), scale=scale))
+    alone = load(None, warm=False)
+    first = alone.plan(asked).plan
+    assert first is not None
+    x, y, heading, speed, steering = first.states[len(first.states) // 2].tolist()
+    aside = scale * (0.5 * CAR.width + 0.01 + 0.1)
+    there = (x - math.sin(heading) * aside, y + math.cos(heading) * aside)
+    post = worlds.box(*there, heading, 0.1 * scale, 0.1 * scale)
+    asked |= {"start": [x, y, heading], "start_speed": speed, "start_steering": steering}
+    asked |= {"obstacles": [post.tolist()]}
+    arrays = (
+        (x, y, heading),
+        asked["goal"],
+        post,
+        np.array([0, 4]),
+        asked["goal_radius"],
+        asked["bounds"],
+        scale,
+    )
+    with pytest.raises(ValueError, match="not free"):
+        alone.plan(asked)
+    with pytest.raises(ValueError, match="not free"):
+        alone.plan_arrays(*arrays, (speed, steering))
+    for answer in (
+        alone.plan(asked, current=first),
+        alone.plan_arrays(*arrays, (speed, steering), current=first),
+    ):
+        assert answer.source == "kept"
