@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 
 from planners.current_plan import rest_of, steps_left
-from planners.routes.legs import Leg, joined, polished_legs
+from planners.routes.legs import Leg, joined, only_near, polished_legs
 from planners.routes.route import Route
+from planners.search.braking import is_free_closely
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import Plan, Problem, start_state, starting_at
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -62,12 +63,20 @@ def _near(
     legs: list[Leg] = []
     for plan, to_stop in zip(plans, problems, strict=True):
         problem = starting_at(to_stop, legs[-1].end) if legs else to_stop
-        rest = rest_of(plan, problem, *around, -math.inf) or rest_of(plan, problem, *around, until)
+        rest = rest_of(plan, problem, *around, -math.inf) or _mended(plan, problem, around, until)
         if rest is None:
             return None
         steps = len(rest.controls)
         legs.append(Leg(rest.states[0], rest.states[-1], rest.controls, steps, None, problem, problem.goal))
     return legs
+
+
+def _mended(plan: Plan, problem: Problem, around: Around, until: float) -> Plan | None:
+    """What is left of a plan that is blocked, or whose stop has moved; only what is near it is looked at."""
+    vehicle, scene, workspace = around
+    near = only_near(problem, plan)
+    rest = rest_of(plan, near, vehicle, scene_of(near), workspace, until)
+    return rest if rest is not None and is_free_closely(rest, vehicle, scene) else None
 
 
 def _plan(leg: Leg, vehicle: Vehicle) -> Plan:

@@ -80,7 +80,7 @@ def polished_legs(
     steps = len(plan.controls)
     if not 0 < steps <= MOST_STEPS or seconds <= 0.0:
         return legs
-    around = _only_near(stricter(problem, plan.states[-1]), plan)
+    around = only_near(stricter(problem, plan.states[-1]), plan)
     better = polish(around, plan, vehicle, scene_of(around), workspace, seconds=seconds).plan
     if better is None or cost_of(better, vehicle) >= cost_of(plan, vehicle):
         return legs
@@ -121,7 +121,7 @@ def stricter(problem: Problem, end: Floats | None = None) -> Problem:
     )
 
 
-def _only_near(problem: Problem, plan: Plan) -> Problem:
+def only_near(problem: Problem, plan: Plan) -> Problem:
     """The problem with only those pieces of obstacles whose boxes are near the drive."""
     places = plan.states[[*range(0, len(plan.states), APART), -1], :2]
     near = [
