@@ -8,6 +8,8 @@ left of its plan is an answer, too, and only a cheaper one replaces it.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -20,9 +22,9 @@ from planners.search.braking import is_free_closely
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Arrival, Plan, Problem, start_state, starting_at
 from planners.world.trigonometry import all_wrapped
 from planners.world.vehicles.dynamics import control_limits, simulate, turn_limit
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -31,11 +33,25 @@ from planners.world.workspace import Workspace
 OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and shares of full speed together
 ROUNDING: Final = 1e-9  # on limits, m/s and radians
 LATER: Final = (0, 2, 5)  # steps by which a drive along a plan may reach the goal later than the plan
+FULL_CONTROLS: Final = (
+    0.3,
+    1.0,
+)  # metres or radians off the plan that weigh as much as one: tight, then gentle
+AROUND: Final = (10, 20, 40)  # steps before and behind what blocks a plan in which a drive may leave it
+NEAR_M: Final = 0.1  # how near it has to come back to it
+NEAR_HEADING: Final = 0.03  # radians
+NEAR_HITCH: Final = 0.1
 SAME: Final = 1e-6  # metres, m/s and radians: a robot that is off by no more drives the same controls on
 
 
 def rest_of(
-    current: Plan, problem: Problem, vehicle: Vehicle, scene: Scene, workspace: Workspace, until: float
+    current: Plan,
+    problem: Problem,
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    until: float,
+    polishes: bool = True,
 ) -> Plan | None:
     """Drive what is left of a plan, from the start of a problem.
 
@@ -49,6 +65,7 @@ def rest_of(
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
         until: when to give up, by ``working_clock``.
+        polishes: whether a drive beside the plan is polished; else it keeps as near to the plan as it can.
 
     Returns:
         A plan for the problem; None if the robot is not near its plan, or no drive near what is left of it is
@@ -70,26 +87,30 @@ def rest_of(
         return None
     around = vehicle, scene, workspace
     left = Plan(current.states[nearest:], controls, vehicle.dt)
-    along = _driven_along(left, start, goal, vehicle, workspace)
-    if problem.asks_for_pose:
+    along = _led_around(_driven_along(left, start, goal, *around), problem, *around, until)
+    better = None
+    if polishes and problem.asks_for_pose:
         better = polish_guesses(problem, [along], *around, until)[1].plan
-    else:  # this keeps some centimetres off obstacles, where that costs little
+    elif polishes:  # this keeps some centimetres off obstacles, where that costs little
         better = polish(problem, along, *around, seconds=until - working_clock()).plan
     arrived = arrives(along.states[-1], goal, vehicle) and is_free_closely(along, vehicle, scene)
     plans = [each for each in (better, along if arrived else None) if each is not None]
     return min(plans, key=lambda each: cost_of(each, vehicle), default=None)
 
 
-def _driven_along(plan: Plan, start: Floats, goal: Floats, vehicle: Vehicle, workspace: Workspace) -> Plan:
+def _driven_along(
+    plan: Plan, start: Floats, goal: Floats, vehicle: Vehicle, scene: Scene, workspace: Workspace
+) -> Plan:
     """Drive along a plan from a state ``start [S]`` beside it, up to where the plan reaches the goal.
 
-    The drive may be blocked, and need not reach the goal.
+    The drive may be blocked or not reach the goal, if no other does that is tried.
     """
     reached = int(steps_to_goal(plan.states, len(plan.controls), goal, vehicle))
     most, last = control_limits(vehicle), reached if reached >= 0 else len(plan.controls)
     turns = start[2] - plan.states[0, 2]
     turns -= math.remainder(turns, math.tau)
-    for later in LATER if reached >= 0 else (0,):
+    best, along = None, plan
+    for later, full_control in product(LATER if reached >= 0 else (0,), FULL_CONTROLS):
         steps = last + later
         model = workspace.buffers(allocate_model, ROOM * (1 + steps // ROOM), len(start))
         model.states[: last + 1] = plan.states[: last + 1]
@@ -98,12 +119,45 @@ def _driven_along(plan: Plan, start: Floats, goal: Floats, vehicle: Vehicle, wor
         model.states[0] = start
         model.controls[:last] = plan.controls[:last]
         model.controls[last:steps] = 0.0
-        follow(model, steps, goal, vehicle)
+        follow(model, steps, goal, full_control, vehicle)
         controls = np.clip(model.tried_controls[:steps], np.negative(most), most)
         along = Plan(simulate(start, controls, vehicle), controls, vehicle.dt)
         if arrives(along.states[-1], goal, vehicle):
+            best = best or along
+            if is_free_closely(along, vehicle, scene):
+                return along
+    return best or along
+
+
+def _led_around(
+    along: Plan, problem: Problem, vehicle: Vehicle, scene: Scene, workspace: Workspace, until: float
+) -> Plan:
+    """A drive along a plan that leaves it where it is blocked and comes back to it, if that is found soon."""
+    states, controls, goal = along.states, along.controls, goal_of(problem, vehicle)
+    first = int(count_free_prefix(states, vehicle, scene))
+    last = len(states) - 1 - int(count_free_prefix(states[::-1].copy(), vehicle, scene))
+    for steps in AROUND if first <= last else ():
+        begin, end = max(first - steps, 0), last + steps
+        if end >= len(controls):
             break
+        there = _coming_by(states[end], starting_at(problem, states[begin]))
+        guess = Plan(states[begin : end + 1], controls[begin:end], vehicle.dt)
+        around = polish_guesses(there, [guess], vehicle, scene, workspace, until)[1].plan
+        if around is not None:
+            behind = Plan(states[end:], controls[end:], vehicle.dt)
+            behind = _driven_along(behind, around.states[-1], goal, vehicle, scene, workspace)
+            joined = np.concatenate((controls[:begin], around.controls, behind.controls))
+            mended = Plan(simulate(states[0], joined, vehicle), joined, vehicle.dt)
+            if arrives(mended.states[-1], goal, vehicle) and is_free_closely(mended, vehicle, scene):
+                return mended
     return along
+
+
+def _coming_by(state: Floats, problem: Problem) -> Problem:
+    """The problem of coming by near a ``state [S]``, as fast, from where a problem starts."""
+    x, y, heading, speed, _, *hitches = state.tolist()
+    arrival = Arrival(heading, NEAR_HEADING, speed, speed, tuple(hitches), (NEAR_HITCH,) * len(hitches))
+    return replace(problem, goal=(x, y), goal_radius=NEAR_M, arrival=arrival)
 
 
 def is_near(current: Plan, state: Floats, vehicle: Vehicle) -> bool:

@@ -6,8 +6,6 @@ away behind the start, also of trailers that are backed, at a cost of two sweeps
 
 from __future__ import annotations
 
-from typing import Final
-
 from planners.optimisation.descent import drive_changed
 from planners.optimisation.gains import LastMotion
 from planners.optimisation.local_model import Model, differentiate_steps
@@ -17,11 +15,9 @@ from planners.world.jit import lean
 from planners.world.vehicles.dynamics import control_limits, numbers_of
 from planners.world.vehicles.vehicle import Vehicle
 
-FULL_CONTROL: Final = 0.3  # metres or radians off the plan that weigh as much as a full control
-
 
 @lean
-def follow(model: Model, steps: int, goal: Floats, vehicle: Vehicle) -> None:
+def follow(model: Model, steps: int, goal: Floats, full_control: float, vehicle: Vehicle) -> None:
     """Drive along a plan of ``steps`` steps, whose first state need not be on it.
 
     Args:
@@ -30,12 +26,13 @@ def follow(model: Model, steps: int, goal: Floats, vehicle: Vehicle) -> None:
         steps: of the plan.
         goal: that of ``goal_of``; the last state moves as it asks, by controls beyond
             their limits if need be.
+        full_control: what weighs as much as a full control, off the plan, in metres or radians.
         vehicle: what is driven.
     """
     size = numbers_of(model.states, vehicle)
     first_weight, second_weight = control_limits(vehicle)
-    first_weight = (FULL_CONTROL / first_weight) ** 2
-    second_weight = (FULL_CONTROL / second_weight) ** 2
+    first_weight = (full_control / first_weight) ** 2
+    second_weight = (full_control / second_weight) ** 2
     by_first, by_second = model.vectors[0], model.vectors[1]
     costs, product = model.squares[0], model.squares[1]
     differentiate_steps(model, steps, vehicle)

@@ -63,7 +63,7 @@ def _near(
     legs: list[Leg] = []
     for plan, to_stop in zip(plans, problems, strict=True):
         problem = starting_at(to_stop, legs[-1].end) if legs else to_stop
-        rest = rest_of(plan, problem, *around, -math.inf) or _mended(plan, problem, around, until)
+        rest = rest_of(plan, problem, *around, -math.inf, False) or _mended(plan, problem, around, until)
         if rest is None:
             return None
         steps = len(rest.controls)
@@ -75,8 +75,12 @@ def _mended(plan: Plan, problem: Problem, around: Around, until: float) -> Plan 
     """What is left of a plan that is blocked, or whose stop has moved; only what is near it is looked at."""
     vehicle, scene, workspace = around
     near = only_near(problem, plan)
-    rest = rest_of(plan, near, vehicle, scene_of(near), workspace, until)
-    return rest if rest is not None and is_free_closely(rest, vehicle, scene) else None
+    of_near = scene_of(near)
+    for polishes in (False, True):  # a polish may end elsewhere in the goal, from where no plan leads on
+        rest = rest_of(plan, near, vehicle, of_near, workspace, until, polishes)
+        if rest is not None and is_free_closely(rest, vehicle, scene):
+            return rest
+    return None
 
 
 def _plan(leg: Leg, vehicle: Vehicle) -> Plan:

@@ -143,6 +143,22 @@ def test_a_blocked_plan_is_left(kind: str) -> None:
     assert faults(problem, answer.plan) == []
 
 
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER], ids=name_of)
+def test_what_stands_on_the_plan_is_passed_and_the_plan_is_driven_on(vehicle: Vehicle) -> None:
+    problem = replace(PLACE, goal=(60.0, 4.0), bounds=(-4.0, -14.0, 66.0, 20.0), obstacles=obstacles_of([]))
+    plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+    assert plan is not None
+    at, on = len(plan.states) // 10, len(plan.states) // 2
+    x, y = plan.states[on, :2].tolist()
+    there = replace(seen_from(plan.states[at], problem), obstacles=obstacles_of([[box(x, y, 0.3, 0.4, 0.4)]]))
+    rest = rest_of(plan, there, vehicle, scene_of(there), WORKSPACE, math.inf, polishes=False)
+    assert rest is not None
+    assert faults(there, rest, vehicle) == []
+    assert rest.duration_s <= plan.dt * (len(plan.controls) - at) + 1.0
+    same = (np.abs(rest.states[: on - at - 50] - plan.states[at : on - 50]) < 1e-9).all(axis=1)
+    assert same.all()  # as far as it need not be left
+
+
 def test_who_is_elsewhere_has_no_plan_left() -> None:
     plan = first_plan("pose", CAR)
     elsewhere = seen_from(np.array([28.0, 0.0, 0.0, 0.0, 0.0]), POSE)
