@@ -17,6 +17,7 @@ from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Arrival, Plan, Problem, obstacles_of, start_state
+from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle, name_of
 from planners.world.workspace import Workspace
 from tests.worlds import box
@@ -83,6 +84,19 @@ def test_beside_its_plan_a_robot_drives_near_it(
         assert rest.duration_s <= plan.dt * (len(plan.controls) - at) + 1.0
     else:
         assert kind == "pose" or solve(problem, "lattice", vehicle=vehicle, current=plan).source != "kept"
+
+
+def test_who_brakes_as_hard_as_it_can_is_not_later_by_rounding() -> None:
+    controls = np.tile([-CAR.max_acceleration, 0.0], (10, 1))
+    states = simulate(np.array([0.0, 0.0, 0.0, 2.0 + 1.000001e-9, 0.0]), controls, CAR)
+    x, y = states[-1, :2].tolist()
+    asked = replace(POSE, goal=(x, y), obstacles=obstacles_of([]), arrival=Arrival(0.0, 0.05, 0.0, 0.0))
+    for at in (0, 5, 9):
+        problem = seen_from(states[at], asked)
+        rest = rest_of(Plan(states, controls), problem, CAR, scene_of(problem), WORKSPACE, math.inf)
+        assert rest is not None
+        assert len(rest.controls) == len(controls) - at
+        assert faults(problem, rest, CAR) == []
 
 
 def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> None:
