@@ -110,7 +110,7 @@ def _driven_along(
 
     The drive may be blocked or not reach the goal, if no other does that is tried.
     """
-    reached = int(steps_to_goal(plan.states, len(plan.controls), goal, vehicle))
+    reached = int(steps_to_goal(plan.states, len(plan.controls), _rounded(goal), vehicle))
     most, last = control_limits(vehicle), reached if reached >= 0 else len(plan.controls)
     turns = start[2] - plan.states[0, 2]
     turns -= math.remainder(turns, math.tau)

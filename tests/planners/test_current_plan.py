@@ -99,6 +99,19 @@ def test_who_brakes_as_hard_as_it_can_is_not_later_by_rounding() -> None:
         assert faults(problem, rest, CAR) == []
 
 
+def test_a_stop_on_the_way_is_one_though_a_robot_beside_its_plan_stands_there_but_for_rounding() -> None:
+    harder = CAR.max_acceleration
+    controls = np.repeat([[-harder, 0.0], [harder, 0.0], [-harder, 0.0]], 10, axis=0)
+    plan = Plan(simulate(np.array([0.0, 0.0, 0.0, 2.0 + 1.000001e-9, 0.0]), controls, CAR), controls)
+    x, y = plan.states[10, :2].tolist()
+    asked = replace(POSE, goal=(x, y), obstacles=obstacles_of([]), arrival=Arrival(0.0, 0.05, 0.0, 0.0))
+    problem = seen_from(plan.states[3] + [0.0, 0.01, 0.0, 0.0, 0.0], asked)
+    rest = rest_of(plan, problem, CAR, scene_of(problem), WORKSPACE, -math.inf)
+    assert rest is not None
+    assert len(rest.controls) <= 9
+    assert faults(problem, rest, CAR) == []
+
+
 def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> None:
     rng, plan = np.random.default_rng(3), first_plan("place", CAR)
     found = 0
