@@ -88,8 +88,10 @@ def rest_of(
         rest = Plan(states[: steps + 1], controls[: max(steps, 0)].copy(), vehicle.dt)
         if steps >= 0 and is_free_closely(rest, vehicle, scene):
             return rest
-    if len(controls) == 0:
-        return None
+    if len(controls) == 0:  # at the end of the plan, which may be the goal of two stops
+        standing = Plan(states, controls, vehicle.dt)
+        is_there = arrives(start, goal, vehicle) and is_free_closely(standing, vehicle, scene)
+        return standing if is_there else None
     around = vehicle, scene, workspace
     left = Plan(current.states[nearest:], controls, vehicle.dt)
     along = _led_around(_driven_along(left, start, goal, *around), problem, *around, until)

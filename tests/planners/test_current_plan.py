@@ -112,6 +112,20 @@ def test_a_stop_on_the_way_is_one_though_a_robot_beside_its_plan_stands_there_bu
     assert faults(problem, rest, CAR) == []
 
 
+@pytest.mark.parametrize(("off", "is_there"), [(0.01, True), (0.11, False)])
+def test_a_robot_beside_the_end_of_its_plan_is_there_if_it_stands_in_the_goal(
+    off: float, is_there: bool
+) -> None:
+    plan, x, y = first_plan("pose", CAR), *POSE.goal
+    problem = seen_from(np.array([x + off, y, 1.2, 0.0, 0.0]), POSE)
+    at_goal = Plan(np.array([[x, y, 1.2, 0.0, 0.0]]), plan.controls[:0])
+    rest = rest_of(at_goal, problem, CAR, scene_of(problem), WORKSPACE, -math.inf)
+    assert (rest is not None) is is_there
+    if rest is not None:
+        assert len(rest.controls) == 0
+        assert faults(problem, rest, CAR) == []
+
+
 def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> None:
     rng, plan = np.random.default_rng(3), first_plan("place", CAR)
     found = 0

@@ -19,7 +19,7 @@ from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRI
 from tests.planners.maps.samples import town
 
 START = (12.0, 150.0, 2.0)
-STOPS = [Stop((90.0, 150.0)), Stop((150.0, 262.0))]
+STOPS = [Stop((90.0, 150.0)), Stop((150.0, 262.0)), Stop((150.0, 262.0))]  # the last one twice
 
 
 def searched(problem: Problem, limits: Limits, vehicle: Vehicle) -> Attempt:
