@@ -76,7 +76,7 @@ def rest_of(
         A plan for the problem; None if the robot is not near its plan, or no drive near what is left of it is
         free and leads to the goal.
     """
-    start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
+    start, goal = start_state(problem, vehicle), _rounded(goal_of(problem, vehicle))
     nearest, apart = _nearest(current, start, vehicle)
     if _off(apart, vehicle) > OFF:
         return None
@@ -84,7 +84,7 @@ def rest_of(
     controls = np.clip(current.controls[nearest:], np.negative(most), most)
     states = simulate(start, controls, vehicle)
     if np.abs(apart).max() <= SAME and _is_within_limits(states, vehicle):
-        steps = int(steps_to_goal(states, len(controls), _rounded(goal), vehicle))
+        steps = int(steps_to_goal(states, len(controls), goal, vehicle))
         rest = Plan(states[: steps + 1], controls[: max(steps, 0)].copy(), vehicle.dt)
         if steps >= 0 and is_free_closely(rest, vehicle, scene):
             return rest
@@ -112,7 +112,7 @@ def _driven_along(
 
     The drive may be blocked or not reach the goal, if no other does that is tried.
     """
-    reached = int(steps_to_goal(plan.states, len(plan.controls), _rounded(goal), vehicle))
+    reached = int(steps_to_goal(plan.states, len(plan.controls), goal, vehicle))
     most, last = control_limits(vehicle), reached if reached >= 0 else len(plan.controls)
     turns = start[2] - plan.states[0, 2]
     turns -= math.remainder(turns, math.tau)
@@ -140,7 +140,7 @@ def _led_around(
     along: Plan, problem: Problem, vehicle: Vehicle, scene: Scene, workspace: Workspace, until: float
 ) -> Plan:
     """A drive along a plan that leaves it where it is blocked and comes back to it, if that is found soon."""
-    states, controls, goal = along.states, along.controls, goal_of(problem, vehicle)
+    states, controls, goal = along.states, along.controls, _rounded(goal_of(problem, vehicle))
     first = int(count_free_prefix(states, vehicle, scene))
     last = len(states) - 1 - int(count_free_prefix(states[::-1].copy(), vehicle, scene))
     for steps in AROUND if first <= last else ():
