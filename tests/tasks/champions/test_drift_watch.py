@@ -143,7 +143,7 @@ def test_what_an_earlier_version_saw_is_shown_beside_the_rest(tmp_path: Path) ->
     seen, faults = read_watched(tmp_path)
     assert faults == []
     shown = {(each["total_s"], each["verdict"]) for each in watched_rows(seen)}
-    assert shown == {("26.0", "later"), (NOTHING, "fewer hits")}
+    assert shown == {("21.0→26.0", "later"), (NOTHING, "fewer hits")}
     assert list(watched_charts(seen))
 
 
