@@ -103,10 +103,10 @@ class Drift:
         }  # fmt: skip
 
     def __str__(self) -> str:
-        verdict = "fallen" if self.has_fallen else "as it was"
+        verdict = _told(self.has_fallen, "fallen", self.now.problems)
         total = ""
         if self.now.solved and self.then.solved:
-            later = "later" if self.is_later else "as it was"
+            later = _told(self.is_later, "later", self.now.solved)
             total = (
                 f"; planning and driving {self.now.total_s:.1f} s, {self.then.total_s:.1f} then ({later}, "
                 f"p = {self.later_p_value:.2g})"
@@ -117,6 +117,13 @@ class Drift:
             f"problems, {100 * self.then.hit_rate:.1f} in {benchmark} ({verdict}, p = {self.p_value:.2g}); "
             f"mean {self.now.mean_ms:.2f} ms, {self.then.mean_ms:.2f} then{total}"
         )
+
+
+def _told(is_worse: bool, worse: str, problems: int) -> str:
+    """What figures of so many problems say; fewer than ``FEWEST`` say nothing, however they look."""
+    if problems < FEWEST:
+        return f"fewer than {FEWEST} problems, too few to say"
+    return worse if is_worse else "as it was"
 
 
 def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:

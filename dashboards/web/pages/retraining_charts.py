@@ -11,11 +11,13 @@ import pandas as pd
 
 from dashboards.cells import NOTHING, PLANNING_TIME, decimal
 from dashboards.palette import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
+from dashboards.verdicts.drift import FEWEST
 from dashboards.web.charts import Chart, Dot, Drawing, Line, dots, lines
 from dashboards.web.memory_versions import MemoryVersion
 
 NEWEST: Final = 20  # rows of the table of what was seen at work
 AS_IT_WAS: Final = "as it was"
+TOO_FEW: Final = "too few to say"  # problems, whatever their hits
 _COLOURS: Final = {
     "promoted": GREEN, "refused": VERMILLION, "awaiting approval": ORANGE, "rolled back": PURPLE,
     "first champion": BLUE,
@@ -126,7 +128,7 @@ def _verdict(row: Mapping[Any, Any]) -> str:
     """What has become worse in a row of ``storage.tables.watched``; earlier versions looked at hits alone."""
     words = {"has_fallen": "fewer hits", "is_later": "later"}
     worse = [word for column, word in words.items() if row[column] is not None and row[column]]
-    return ", ".join(worse) or AS_IT_WAS
+    return ", ".join(worse) or (TOO_FEW if row["problems"] < FEWEST else AS_IT_WAS)
 
 
 def _colour(verdict: str) -> str:
@@ -143,7 +145,7 @@ def _watched(title: str, seen: pd.DataFrame) -> Drawing:
         Line("in its benchmark", np.array([ends[0], *number, ends[1]]), np.pad(promised, 1, "edge"), GREEN),
         Line("at work", number, hits, BLUE, dots=True),
     ]
-    drifted = [_verdict(row) != AS_IT_WAS for row in seen.to_dict("records")]
+    drifted = [_verdict(row) not in (AS_IT_WAS, TOO_FEW) for row in seen.to_dict("records")]
     for i in np.flatnonzero(drifted):
         drawn.append(Line("drifted", number[i : i + 1], hits[i : i + 1], VERMILLION, dots=True))
     return lines(

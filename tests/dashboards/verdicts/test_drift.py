@@ -45,6 +45,15 @@ def test_hits_have_fallen_where_they_are_significantly_fewer(problems: int, hits
     assert _fallen(problems, hits) is fallen
 
 
+def test_what_is_told_of_few_problems_is_that_they_are_too_few_to_say() -> None:
+    few, many = (replace(THEN, problems=count, hits=0, solved=count) for count in (FEWEST - 1, FEWEST))
+    of_few, of_many = (str(drifts("trap/2", {NAME: now}, {NAME: THEN})[0]) for now in (few, many))
+    assert of_few.count("too few to say") == 2  # hits and total times
+    assert "as it was" not in of_few
+    assert "(fallen" in of_many
+    assert "(as it was" in of_many
+
+
 def test_chance_hardly_ever_is_a_drift() -> None:
     rng = np.random.default_rng(1)
     drawn = rng.binomial(200, 0.8, 2_000)

@@ -13,7 +13,7 @@ import pytest
 from prefect.server.events.schemas.events import Resource, ResourceSpecification
 
 from dashboards.cells import NOTHING
-from dashboards.verdicts.drift import Drift, Usefulness, drifts
+from dashboards.verdicts.drift import FEWEST, Drift, Usefulness, drifts
 from dashboards.web.pages.retraining_charts import watched_charts, watched_rows
 from planners.attempt import DRIVES, SUB_PLANS
 from storage.places.data_folder import open_data_folder
@@ -145,6 +145,13 @@ def test_what_an_earlier_version_saw_is_shown_beside_the_rest(tmp_path: Path) ->
     shown = {(each["total_s"], each["verdict"]) for each in watched_rows(seen)}
     assert shown == {("21.0→26.0", "later"), (NOTHING, "fewer hits")}
     assert list(watched_charts(seen))
+
+
+def test_a_page_says_of_few_problems_that_they_are_too_few(tmp_path: Path) -> None:
+    few = replace(THEN, problems=FEWEST - 1, hits=0)
+    add_watched(tmp_path, [each.to_row() for each in drifts("trap/2", {NAME: few}, {NAME: THEN})])
+    seen, _ = read_watched(tmp_path)
+    assert [each["verdict"] for each in watched_rows(seen)] == ["too few to say"]
 
 
 def test_who_cannot_be_told_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
