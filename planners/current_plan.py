@@ -18,11 +18,11 @@ from planners.optimisation.descent import arrives, steps_to_goal
 from planners.optimisation.following import follow
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import ROOM, polish, polish_guesses
-from planners.search.braking import is_free_closely
+from planners.search.braking import count_closely_free, is_free_closely, is_free_drive
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of
-from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.geometry.collision import Scene
 from planners.world.goal import (
     HEADING_TOLERANCE,
     HITCHES,
@@ -42,6 +42,8 @@ OFF: Final = 1.0  # by which a robot may be off its plan: lengths, radians and s
 ROUNDING: Final = 1e-9  # on limits and at the goal, m/s and radians
 LATER: Final = (0, 2, 5)  # steps by which a drive along a plan may reach the goal later than the plan
 FULL_CONTROLS: Final = (0.3, 1.0)  # metres or radians off the plan, as heavy as one: tight, then gentle
+MOST_BLOCKS: Final = 4  # on a plan that a drive is led around
+SOONER: Final = 5  # steps by which the next may come sooner than on the plan
 AROUND: Final = (10, 20, 40)  # steps before and behind what blocks a plan in which a drive may leave it
 NEAR_M: Final = 0.1  # how near it has to come back to it
 NEAR_HEADING: Final = 0.03  # radians
@@ -70,7 +72,7 @@ def rest_of(
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
         until: when to give up, by ``working_clock``.
-        polishes: whether a drive beside the plan is polished; else it keeps as near to the plan as it can.
+        polishes: whether a drive along the plan is polished if it is free, too; else it keeps near the plan.
 
     Returns:
         A plan for the problem; None if the robot is not near its plan, or no drive near what is left of it is
@@ -95,12 +97,13 @@ def rest_of(
     around = vehicle, scene, workspace
     left = Plan(current.states[nearest:], controls, vehicle.dt)
     along = _led_around(_driven_along(left, start, goal, *around), problem, *around, until)
-    better = None
-    if polishes and problem.asks_for_pose:
-        better = polish_guesses(problem, [along], *around, until)[1].plan
-    elif polishes:  # this keeps some centimetres off obstacles, where that costs little
-        better = polish(problem, along, *around, seconds=until - working_clock()).plan
     arrived = arrives(along.states[-1], goal, vehicle) and is_free_closely(along, vehicle, scene)
+    if arrived and not polishes:
+        return along
+    if problem.asks_for_pose:
+        better = polish_guesses(problem, [along], *around, until)[1].plan
+    else:  # this keeps some centimetres off obstacles, where that costs little
+        better = polish(problem, along, *around, seconds=until - working_clock()).plan
     plans = [each for each in (better, along if arrived else None) if each is not None]
     return min(plans, key=lambda each: cost_of(each, vehicle), default=None)
 
@@ -140,24 +143,52 @@ def _led_around(
     along: Plan, problem: Problem, vehicle: Vehicle, scene: Scene, workspace: Workspace, until: float
 ) -> Plan:
     """A drive along a plan that leaves it where it is blocked and comes back to it, if that is found soon."""
-    states, controls, goal = along.states, along.controls, _rounded(goal_of(problem, vehicle))
-    first = int(count_free_prefix(states, vehicle, scene))
-    last = len(states) - 1 - int(count_free_prefix(states[::-1].copy(), vehicle, scene))
-    for steps in AROUND if first <= last else ():
-        begin, end = max(first - steps, 0), last + steps
+    for _ in range(MOST_BLOCKS):
+        free = count_closely_free(along, vehicle, scene)
+        if free == len(along.states):
+            break
+        better = _led_around_one(along, free, problem, (vehicle, scene, workspace), until)
+        if better is None:
+            break
+        along = better
+    return along
+
+
+def _led_around_one(
+    along: Plan,
+    free: int,
+    problem: Problem,
+    around: tuple[Vehicle, Scene, Workspace],
+    until: float,
+) -> Plan | None:
+    """A drive around the first thing that blocks a drive, of whose states so many are ``free`` before."""
+    states, controls, (vehicle, scene, _) = along.states, along.controls, around
+    last = free + 1  # the step to it may be blocked alone
+    while last < len(states) - 1 and not is_free_drive(states[last : last + 1], vehicle, scene):
+        last += 1
+    rest = Plan(states[last:], controls[last:], vehicle.dt)
+    next_blocked = last + count_closely_free(rest, vehicle, scene)
+    goal = _rounded(goal_of(problem, vehicle))
+    for steps in AROUND:
+        begin, end = max(free - steps, 0), last + steps
         if end >= len(controls):
             break
         there = _coming_by(states[end], starting_at(problem, states[begin]))
         guess = Plan(states[begin : end + 1], controls[begin:end], vehicle.dt)
-        around = polish_guesses(there, [guess], vehicle, scene, workspace, until)[1].plan
-        if around is not None:
-            behind = Plan(states[end:], controls[end:], vehicle.dt)
-            behind = _driven_along(behind, around.states[-1], goal, vehicle, scene, workspace)
-            joined = np.concatenate((controls[:begin], around.controls, behind.controls))
-            mended = Plan(simulate(states[0], joined, vehicle), joined, vehicle.dt)
-            if arrives(mended.states[-1], goal, vehicle) and is_free_closely(mended, vehicle, scene):
-                return mended
-    return along
+        leaving = polish_guesses(there, [guess], *around, until)[1].plan
+        if leaving is None:
+            continue
+        behind = Plan(states[end:], controls[end:], vehicle.dt)
+        behind = _driven_along(behind, leaving.states[-1], goal, *around)
+        joined = np.concatenate((controls[:begin], leaving.controls, behind.controls))
+        mended = Plan(simulate(states[0], joined, vehicle), joined, vehicle.dt)
+        beyond = count_closely_free(mended, vehicle, scene) - (begin + len(leaving.controls))
+        comes_back = beyond >= next_blocked - end - SOONER
+        if next_blocked == len(states):
+            comes_back &= arrives(mended.states[-1], goal, vehicle)
+        if comes_back:
+            return mended
+    return None
 
 
 def _coming_by(state: Floats, problem: Problem) -> Problem:

@@ -75,12 +75,8 @@ def _mended(plan: Plan, problem: Problem, around: Around, until: float) -> Plan 
     """What is left of a plan that is blocked, or whose stop has moved; only what is near it is looked at."""
     vehicle, scene, workspace = around
     near = only_near(problem, plan)
-    of_near = scene_of(near)
-    for polishes in (False, True):  # a polish may end elsewhere in the goal, from where no plan leads on
-        rest = rest_of(plan, near, vehicle, of_near, workspace, until, polishes)
-        if rest is not None and is_free_closely(rest, vehicle, scene):
-            return rest
-    return None
+    rest = rest_of(plan, near, vehicle, scene_of(near), workspace, until, False)
+    return rest if rest is not None and is_free_closely(rest, vehicle, scene) else None
 
 
 def _plan(leg: Leg, vehicle: Vehicle) -> Plan:

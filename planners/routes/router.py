@@ -44,6 +44,7 @@ CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map
 WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that are tried next ...
 DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
 ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
+FOR_SEARCH: Final = 0.25  # share of the time, at least, where what is left of a plan has to be mended
 OF_OUTLINE: Final = 0.9  # of its width: with an outline a body may fit through gaps narrower than its box
 
 
@@ -110,9 +111,9 @@ class Router:
         kept = None
         if current is not None:
             around = self._vehicle, self._scene, self._workspace
-            half = math.inf if time_limit is None else until - 0.5 * time_limit
-            polished_until = half if refused is None else -math.inf
-            kept = kept_route(current, problems, around, self._polishes, polished_until)
+            most = math.inf if time_limit is None else until - FOR_SEARCH * time_limit
+            kept_until = most if refused is None else -math.inf
+            kept = kept_route(current, problems, around, self._polishes, kept_until)
         if refused is not None:  # a robot that drives may be within the margins of what it passes
             return kept or refused
         found = self._searched(problems, stops, state, until)

@@ -50,21 +50,28 @@ def is_free_drive(states: Floats, vehicle: Vehicle, scene: Scene) -> bool:
 
 
 def is_free_closely(plan: Plan, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether a drive is free if it is looked at closely where it passes obstacles within the usual margins.
+    """Whether a drive is free if it is looked at closely where it passes something within usual margins."""
+    return count_closely_free(plan, vehicle, scene) == len(plan.states)
 
-    Those keep what moves between two states off obstacles that neither state meets. In short steps they are
-    smaller. Not for vehicles of the first order, whose controls depend on the step.
+
+def count_closely_free(plan: Plan, vehicle: Vehicle, scene: Scene) -> int:
+    """How many states from the first one on are free, with the steps between them, if looked at closely.
+
+    The usual margins keep what moves between two states off obstacles that neither state meets. In short
+    steps they are smaller. Not for vehicles of the first order, whose controls depend on the step.
     """
     states, short, last, at = plan.states, in_short_steps(vehicle), len(plan.controls), 0
+    if last == 0:
+        return int(is_free_drive(states, short, scene))
     while (at := at + int(count_free_prefix(states[at:], vehicle, scene))) <= last:
         if vehicle.first_order:
-            return False
+            return at
         for step in range(max(at - 1, 0), min(at + 1, last)):
             within = simulate(states[step], np.tile(plan.controls[step], (SHORT_STEPS, 1)), short)
             if not is_free_drive(within, short, scene):
-                return False
+                return step
         at += 1
-    return last > 0 or is_free_drive(states, short, scene)
+    return last + 1
 
 
 def _ramp(change: float, rate: float, dt: float) -> Floats:
