@@ -195,6 +195,36 @@ def test_the_example_of_the_page_runs_without_what_a_robot_has_not(memory: Path,
     assert re.fullmatch(r"(recalled|repaired|searched): \d+ states in [0-9.]+ ms", lines[0])
 
 
+@pytest.mark.parametrize("scale", [1.0, 0.1])
+@pytest.mark.parametrize("states_it", [True, False])
+def test_who_drives_is_the_vehicle_of_the_problem_at_its_scale(scale: float, states_it: bool) -> None:
+    alone = load(None, vehicle="differential-drive", warm=False)
+    asked = {
+        "start": [0.0, 0.0, 0.0],
+        "goal": [20.0 * scale, 4.0 * scale],
+        "goal_radius": 0.5 * scale,
+        "bounds": [-5.0 * scale, -9.0 * scale, 25.0 * scale, 9.0 * scale],
+        "obstacles": [],
+        "scale": scale,
+    } | ({"vehicle": "differential-drive"} if states_it else {})
+    plan = alone.plan(asked).plan
+    assert plan is not None
+    state = plan.states[10].tolist()
+    moved = asked | {"start": state[:3], "start_speed": state[3], "start_turn_rate": state[4]}
+    again = alone.plan(moved, current=plan)
+    assert again.plan is not None
+    assert again.near_current is True
+    assert again.plan.duration_s <= plan.duration_s - 10 * plan.dt + 1e-9
+    arrays = alone.plan_arrays(
+        *(state[:3], asked["goal"], [], [], asked["goal_radius"], asked["bounds"], scale, state[3:]),
+        current=plan,
+    )
+    assert arrays.near_current is True
+    walled = moved | {"obstacles": [box(state[0], state[1], 0.2 * scale)]}
+    with pytest.raises(ValueError, match="start footprint of differential-drive "):
+        alone.plan(walled, current=plan)
+
+
 def test_the_current_plan_is_numbers_of_any_kind_and_nothing_else(planner: Memory) -> None:
     asked = problem(0)
     plan = planner.plan(asked).plan

@@ -116,11 +116,15 @@ def test_the_problem_that_is_picked_is_the_one_that_is_answered(
     assert told["answer"]["problem_id"] == problem(1).id
 
 
-@pytest.mark.parametrize("east", [0.0, 5_000.0])
+@pytest.mark.parametrize(("east", "stated"), [(0.0, {}), (5_000.0, {"vehicle": "car"})])
 def test_who_drives_a_plan_is_given_what_is_left_of_it_unless_another_is_quicker(
-    east: float, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    east: float,
+    stated: dict[str, str],
+    place: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    asked = json.loads((place / "one.json").read_text())
+    asked = json.loads((place / "one.json").read_text()) | stated
     for name in ("start", "goal"):
         asked[name][0] += east
     asked["bounds"] = [low + (0.0 if axis % 2 else east) for axis, low in enumerate(asked["bounds"])]
