@@ -27,7 +27,7 @@ def problem_of_arrays(
     start_motion: tuple[float, ...],
     arrival: Arrival | None,
     vehicle: Vehicle,
-    driving: bool,
+    driving: bool = False,
 ) -> Problem:
     """Make a problem of what ``Memory.plan_arrays`` is given.
 
