@@ -124,8 +124,9 @@ def _warmed(ready: Memory) -> Memory:
 
     alone = replace(ready, assist="none")
     for each in (ready, alone):  # recall, then search
-        ask(each, current=ask(each))  # and again from beside the plan
+        plan = ask(each)
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
+    ask(alone, current=plan)  # again, from beside its plan
     for name in families_of(ready.vehicle)[:1]:  # there is none for a vehicle that cannot drive backwards
         narrow = replace(family(name, "easy", ready.vehicle).draw(0, 0), scale=scale)
         ready.plan(narrow)

@@ -53,15 +53,16 @@ def driven_along(
     turns = start[2] - plan.states[0, 2]
     turns -= math.remainder(turns, math.tau)
     best, along = None, plan
+    longest = last + max(LATER)
+    model = workspace.buffers(allocate_model, ROOM * (1 + longest // ROOM), len(start))
+    model.states[: last + 1] = plan.states[: last + 1]
+    model.states[last + 1 : longest + 1] = plan.states[last]
+    model.states[: longest + 1, 2] += turns
+    model.states[0] = start
+    model.controls[:last] = plan.controls[:last]
+    model.controls[last:longest] = 0.0
     for later, full_control in product(LATER if reached >= 0 else (0,), FULL_CONTROLS):
         steps = last + later
-        model = workspace.buffers(allocate_model, ROOM * (1 + steps // ROOM), len(start))
-        model.states[: last + 1] = plan.states[: last + 1]
-        model.states[last + 1 : steps + 1] = plan.states[last]
-        model.states[: steps + 1, 2] += turns
-        model.states[0] = start
-        model.controls[:last] = plan.controls[:last]
-        model.controls[last:steps] = 0.0
         follow(model, steps, goal, full_control, vehicle)
         controls = np.clip(model.tried_controls[:steps], np.negative(most), most)
         along = Plan(simulate(start, controls, vehicle), controls, vehicle.dt)

@@ -33,7 +33,7 @@ def follow(model: Model, steps: int, goal: Floats, full_control: float, vehicle:
     first_weight, second_weight = control_limits(vehicle)
     first_weight = (full_control / first_weight) ** 2
     second_weight = (full_control / second_weight) ** 2
-    by_first, by_second = model.vectors[0], model.vectors[1]
+    by_first, by_second, across_first, across_second = model.vectors[:4]
     costs, product = model.squares[0], model.squares[1]
     differentiate_steps(model, steps, vehicle)
     for r in range(size):
@@ -61,21 +61,16 @@ def follow(model: Model, steps: int, goal: Floats, full_control: float, vehicle:
         determinant = first * second - both * both
         feedback = model.feedback[k]
         for c in range(size):
-            across_first = 0.0
-            across_second = 0.0
+            across_first[c] = 0.0
+            across_second[c] = 0.0
             for j in range(size):
-                across_first += by_first[j] * a[j, c]
-                across_second += by_second[j] * a[j, c]
-            feedback[0, c] = (both * across_second - second * across_first) / determinant
-            feedback[1, c] = (both * across_first - first * across_second) / determinant
+                across_first[c] += by_first[j] * a[j, c]
+                across_second[c] += by_second[j] * a[j, c]
+            feedback[0, c] = (both * across_second[c] - second * across_first[c]) / determinant
+            feedback[1, c] = (both * across_first[c] - first * across_second[c]) / determinant
         for r in range(size):
-            across_first = 0.0
-            across_second = 0.0
-            for j in range(size):
-                across_first += by_first[j] * a[j, r]
-                across_second += by_second[j] * a[j, r]
             for c in range(size):
-                value = across_first * feedback[0, c] + across_second * feedback[1, c]
+                value = across_first[r] * feedback[0, c] + across_second[r] * feedback[1, c]
                 for j in range(size):
                     value += a[j, r] * product[j, c]
                 costs[r, c] = value

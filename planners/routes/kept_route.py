@@ -49,7 +49,8 @@ def kept_route(
         if better is before[0]:
             continue
         moved = [starting_at(each, better.end) for each in problems[number + 1 :]]
-        behind = _near([_plan(leg, vehicle) for leg in before[1:]], moved, around, until)
+        plans = [joined(leg.problem, [leg], vehicle) for leg in before[1:]]
+        behind = _near(plans, moved, around, until)
         if behind is not None and _cost([better, *behind], vehicle) <= _cost(before, vehicle):
             legs[number:] = [better, *behind]
     paths = [leg.states(vehicle)[:, :2] for leg in legs]
@@ -77,10 +78,6 @@ def _mended(plan: Plan, problem: Problem, around: Around, until: float) -> Plan 
     near = only_near(problem, plan)
     rest = rest_of(plan, near, vehicle, scene_of(near), workspace, until, False)
     return rest if rest is not None and is_free_closely(rest, vehicle, scene) else None
-
-
-def _plan(leg: Leg, vehicle: Vehicle) -> Plan:
-    return Plan(leg.states(vehicle), leg.controls, vehicle.dt)
 
 
 def _cost(legs: Sequence[Leg], vehicle: Vehicle) -> float:

@@ -52,14 +52,22 @@ def seen_from(state: np.ndarray, problem: Problem) -> Problem:
     return replace(problem, start=(x, y, heading), start_motion=tuple(motion))
 
 
+def beside_plan(
+    case: tuple[str, Vehicle], share: float, off: tuple[float, float, float]
+) -> tuple[int, Problem]:
+    """How many steps make a share of a case's plan, and the problem seen from so far off it there."""
+    (kind, _), plan = case, first_plan(*case)
+    at = int(share * (len(plan.states) - 1))
+    state = plan.states[at].copy()
+    state[:3] += off
+    return at, seen_from(state, ASKED[kind])
+
+
 @settings(deadline=None, max_examples=12)
 @given(CASES, st.floats(0.0, 1.0), st.sampled_from([-math.tau, 0.0, math.tau]))
 def test_planning_again_never_arrives_later(case: tuple[str, Vehicle], share: float, turn: float) -> None:
-    (kind, vehicle), plan = case, first_plan(*case)
-    at = int(share * (len(plan.states) - 1))
-    state = plan.states[at].copy()
-    state[2] += turn  # a measured heading knows no whole turns
-    problem = seen_from(state, ASKED[kind])
+    (_, vehicle), plan = case, first_plan(*case)
+    at, problem = beside_plan(case, share, (0.0, 0.0, turn))  # a measured heading knows no whole turns
     answer = solve(problem, "lattice", vehicle=vehicle, limits=FEW, workspace=WORKSPACE, current=plan)
     assert answer.plan is not None
     assert faults(problem, answer.plan, vehicle) == []
@@ -74,10 +82,7 @@ def test_beside_its_plan_a_robot_drives_near_it(
     case: tuple[str, Vehicle], share: float, x: float, y: float, turn: float
 ) -> None:
     (kind, vehicle), plan = case, first_plan(*case)
-    at = int(share * (len(plan.states) - 1))
-    state = plan.states[at].copy()
-    state[:3] += (x, y, turn)
-    problem = seen_from(state, ASKED[kind])
+    at, problem = beside_plan(case, share, (x, y, turn))
     rest = rest_of(plan, problem, vehicle, scene_of(problem), WORKSPACE, math.inf)
     if rest is not None:  # a step before a wall there may be no way on
         assert faults(problem, rest, vehicle) == []
@@ -142,11 +147,9 @@ def test_without_limits_of_time_most_measured_states_are_driven_on_from() -> Non
 def test_where_nothing_is_in_the_way_who_is_beside_a_plan_drives_on_without_any_time(
     case: tuple[str, Vehicle], share: float, x: float, y: float, turn: float
 ) -> None:
-    (kind, vehicle), plan = case, first_plan(*case)
-    at = int(share * (len(plan.states) - 1))
-    state = plan.states[at].copy()
-    state[:3] += (x, y, turn)
-    problem = replace(seen_from(state, ASKED[kind]), obstacles=obstacles_of([]))
+    (_, vehicle), plan = case, first_plan(*case)
+    at, walled = beside_plan(case, share, (x, y, turn))
+    problem = replace(walled, obstacles=obstacles_of([]))
     rest = rest_of(plan, problem, vehicle, scene_of(problem), WORKSPACE, -math.inf)
     assert rest is not None
     assert faults(problem, rest, vehicle) == []
