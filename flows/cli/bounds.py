@@ -18,7 +18,7 @@ from annotated_types import Ge, Interval
 if TYPE_CHECKING:
     from prefect import Flow
 
-_LARGEST: Final = sys.float_info.max  # infinity is none of these
+_LARGEST: Final = sys.float_info.max  # every number but infinity is at most that
 _USUAL: Final = {int: Ge(1)}  # most whole numbers count something
 _OF_NAME: Final = {
     "seed": Ge(0),

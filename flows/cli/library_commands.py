@@ -76,15 +76,13 @@ def retrain_library(
         reading: How maps are read.
     """
     from tasks.libraries.pending_library import check_there_is_something, library_dry_run
-    from tasks.registry.settled_vehicle import vehicle_line
-    from tasks.requests.question_sources import first_of_problems
     from tasks.servers.prefect_server import local_server
     from tasks.session.folder_lock import locked_folder
     from tasks.settings.environment import default_data
 
     data = options.data or default_data()
-    asked, driver = _asked(name, sources or [], options, reading)
-    write_for_people(vehicle_line(driver, options.vehicle, first_of_problems(asked.sources)))
+    asked, driver, told = _asked(name, sources or [], options, reading)
+    write_for_people(told)
     if dry_run:
         write(library_dry_run(data, asked))
         return 0
@@ -130,14 +128,12 @@ def serve_library(
     from tasks.champions.drift_watch import RESOURCE, RESOURCE_OF
     from tasks.champions.retraining_schedule import serve
     from tasks.libraries.pending_library import check_there_is_something
-    from tasks.registry.settled_vehicle import vehicle_line
-    from tasks.requests.question_sources import first_of_problems
     from tasks.settings.environment import default_data
 
     data = options.data or default_data()
-    asked, driver = _asked(name, sources or [], options, reading)
+    asked, driver, told = _asked(name, sources or [], options, reading)
     check_there_is_something(data, asked)
-    write_for_people(vehicle_line(driver, options.vehicle, first_of_problems(asked.sources)))
+    write_for_people(told)
     given = _parameters(asked, driver, options, reading)
     drifting = {RESOURCE: f"{RESOURCE_OF}{asked.registered}/*"}
     serve(retrain_library_flow, ENTRYPOINT, given, data, every, cron, asked.registered, drifting)
@@ -164,17 +160,21 @@ def _parameters(
 
 def _asked(
     name: str, sources: list[str], options: LibraryOptions, reading: MapOptions
-) -> tuple[LibraryRetraining, str]:
-    """What is asked for, and the vehicle that drives; raises UsageError before anything starts."""
+) -> tuple[LibraryRetraining, str, str]:
+    """What is asked for, the vehicle that drives, and the line that tells people of it.
+
+    Raises UsageError before anything starts.
+    """
     from tasks.libraries.pending_library import library_retraining
-    from tasks.registry.settled_vehicle import settled_vehicle
+    from tasks.registry.settled_vehicle import settled_vehicle, vehicle_line
     from tasks.requests.import_worlds import import_settings
     from tasks.requests.question_sources import first_of_problems
 
-    driver = settled_vehicle(options.vehicle, first_of_problems(sources))
+    problems = first_of_problems(sources)
+    driver = settled_vehicle(options.vehicle, problems)
     settings = import_settings(driver, options.seed, **asdict(reading))
     asked = library_retraining(
         *(name, sources, options.plans, options.poses, options.difficulty, settings),
         *(options.test_problems, options.approve),
     )
-    return asked, driver
+    return asked, driver, vehicle_line(driver, options.vehicle, problems)

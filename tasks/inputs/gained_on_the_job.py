@@ -86,9 +86,10 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
 
 
 def remember_or_warn(data: Path | None, attempts: Sequence[Solved], vehicle: Vehicle) -> int | None:
-    """Like ``remember``, for who has a plan in hand: warn if nothing can be kept, and return None.
+    """Keep what can be learned of attempts whose answer stands whether that works or not.
 
-    Without a data folder nothing is kept: 0.
+    Like ``remember``, but if nothing can be kept it warns and returns None. Without a data folder it keeps
+    nothing and returns 0.
     """
     if data is None:
         return 0

@@ -100,9 +100,9 @@ def plan_one(
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
         from dashboards.figures.style import save_picture
 
-        far = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
+        lengths = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
         gears = "" if plan is None else gears_told(answer)
-        caption = f"{far}{attempt.source or attempt.status}{gears}"
+        caption = f"{lengths}{attempt.source or attempt.status}{gears}"
         moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
         figure = picture(
             *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
